@@ -1,4 +1,4 @@
-# What people run. Each target sets up what it needs first; `make setup` alone does only that.
+# The commands for people. Each target first sets up what it needs; `make setup` does only that.
 
 .DEFAULT_GOAL := help
 SHELL := /bin/sh
@@ -15,19 +15,19 @@ quick = $(filter --quick,$(ARGS))
 
 .PHONY: help
 help:
-	@echo "make demo     the whole loop on a virtual robot with an undeclared effect, and its report"
-	echo "make test     every test: native, sanitized, in the simulated ATmega328P, Python (ARGS=--quick: two minutes of them)"
-	echo "make bench    every figure, beside its peer or limit, and bench.json (ARGS='--only NAME' for one)"
-	echo "make soak     the long proofs and fuzzers"
-	echo "make mutation  does a test miss each line of the safety code? (ARGS='--help')"
-	echo "make portability  the numerical tests as on other machines: linear algebra, locale, home... (ARGS='--help')"
-	echo "make blind    diagnosis of sealed data sets: rates against what is required and baselines (ARGS='--help', ARGS='systems --help')"
-	echo "make notebooks  run the notebooks of docs/ and keep them with what they give (ARGS=NAME for one)"
-	echo "make lint     formatters and static checks; make format applies the formatters"
-	echo "make wheels   sdists and wheels of the three packages, into dist/"
-	echo "make setup    only install what is needed: Debian packages, .venv, PlatformIO's packages"
-	echo "make lock     resolve host/requirements.in anew"
-	echo "make clean    remove what was built; make distclean removes .venv and .platformio as well"
+	@echo "make demo     run the whole loop on a virtual robot with an undeclared effect, and write its report"
+	echo "make test     run all tests: native, sanitized, simulated ATmega328P, Python (ARGS=--quick: the quick ones, two minutes)"
+	echo "make bench    measure all figures, compare each with its peer or limit, write bench.json (ARGS='--only NAME' for one)"
+	echo "make soak     run the long tests and fuzzers, the portability tests and a sample of the mutation tests"
+	echo "make mutation  change the safety code in one place at a time: does a test fail each time? (ARGS='--help')"
+	echo "make portability  run the numerical tests as on other machines: linear algebra, locale, home... (ARGS='--help')"
+	echo "make blind    diagnose sealed data sets: rates against requirements and baselines (ARGS='--help', ARGS='systems --help')"
+	echo "make notebooks  run the notebooks in docs/ and store them with their outputs (ARGS=NAME for one)"
+	echo "make lint     run the formatters' checks and the static checks; make format applies the formatters"
+	echo "make wheels   build sdists and wheels of the three packages in dist/"
+	echo "make setup    set up only: Debian packages, .venv, PlatformIO's packages, compiled parts, firmware"
+	echo "make lock     resolve host/requirements.in into host/requirements.lock"
+	echo "make clean    remove build products; make distclean also removes .venv and .platformio"
 
 .PHONY: demo test bench soak mutation portability blind notebooks
 demo: setup
@@ -35,7 +35,7 @@ demo: setup
 
 test: setup
 	@failed=
-	test -n "$(quick)" || $(MAKE) $(stamps)/browser || echo "The tests of the pages are skipped: they need a browser"
+	test -n "$(quick)" || $(MAKE) $(stamps)/browser || echo "Skipping the browser tests: no browser could be installed"
 	for environment in native $(if $(quick),,sanitized simavr); do
 	    $(bin)/python tools/unity_suites.py $$environment || failed="$$failed $$environment"
 	done
@@ -83,7 +83,7 @@ lint: $(python) $(stamps)/lint
 	check "tests and benchmarks use no private names" $(bin)/python tools/private.py
 	check "import rules" sh -c 'cd host && ../$(bin)/lint-imports --no-cache >../build/imports.txt 2>&1 || { cat ../build/imports.txt; exit 1; }'
 	check "clang-format" clang-format --dry-run -Werror $(cpp_files)
-	check "lib/ knows no Arduino" tools/check-includes.sh
+	check "lib/ includes no Arduino headers" tools/check-includes.sh
 	check "compiler warnings in lib/" tools/check-warnings.sh
 	check "cppcheck" tools/check-cppcheck.sh
 	test -z "$$failed" || { echo "lint failed: $${failed#, }" >&2; exit 1; }
@@ -117,7 +117,7 @@ $(python): tools/python-environment.sh host/requirements.lock host/pyproject.tom
 
 .PHONY: virtual_robot
 virtual_robot: $(python)
-	@cd host && ../$(bin)/python -m virtual_robot.build  # knows itself what is up to date
+	@cd host && ../$(bin)/python -m virtual_robot.build  # compiles only what is out of date
 
 $(stamps)/lanes: $(python) $(wildcard host/bifa/simulate/*.py host/bifa/simulate/lanes/* host/bifa/effects/*.py)
 	@cd host && ../$(bin)/python -m bifa.simulate.lanes
@@ -132,7 +132,7 @@ $(stamps)/firmware: $(stamps)/platformio platformio.ini $(shell find firmware li
 	$(bin)/pio run --silent --environment uno
 	touch $@
 
-# A build folder that went missing (`pio run -t fullclean`) makes its stamp void.
+# A stamp whose build folder is gone (`pio run -t fullclean`) is void.
 $(if $(wildcard .pio/build/uno/firmware.elf),,$(shell rm -f $(stamps)/firmware))
 $(if $(wildcard .platformio/provisioned.json),,$(shell rm -f $(stamps)/platformio))
 

@@ -1,4 +1,4 @@
-"""Resolve host/requirements.in into host/requirements.lock: versions and hashes for every platform, no index named."""
+"""Resolve host/requirements.in into host/requirements.lock: versions and hashes for every platform, no index URL."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ HOST = Path(__file__).resolve().parent.parent / "host"
 
 
 def main() -> int:
-    """Write the lock file with uv, which is needed for nothing else and so lives in a temporary environment."""
+    """Write the lock file with uv, which is installed in a temporary environment since nothing else needs it."""
     with tempfile.TemporaryDirectory(prefix="lock-") as scratch:
         venv.create(scratch, with_pip=True)
         bin_folder = Path(scratch) / "bin"

@@ -1,5 +1,5 @@
-"""Hold the words of docs/glossary.md: python tools/names.py. Identifiers use the field's, in American spelling; a class
-has its name to itself."""
+"""Enforce the words of docs/glossary.md: python tools/names.py. Identifiers use the field's terms, in American
+spelling; no two classes share a name."""
 
 import ast
 import io
@@ -11,14 +11,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("host/bifa", "host/lacuna", "host/virtual_robot", "host/harness", "host/benchmarks", "schema", "tools")
-LEFT_OUT = ("tools/stand_ins",)  # in the place of others' files
+LEFT_OUT = ("tools/stand_ins",)  # in place of other projects' files
 OURS = (
     "host/bifa",
     "host/lacuna",
     "host/harness",
     "host/benchmarks",
-)  # the virtual robot is another world, which may say Plant as well
-PRIVATE = {  # a word of ours: the field's
+)  # the virtual robot is independent and may have a Plant of its own
+PRIVATE = {  # our private word: the field's
     "afar": "multi_start",
     "afresh": "cold_start",
     "anew": "cold_start",
@@ -42,7 +42,7 @@ _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 
 
 def main() -> int:
-    """Say where an identifier has a word that is not the field's, and which classes share a name."""
+    """Print identifiers with words that are not the field's, and classes that share a name."""
     files = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
     found = [fault for path in files if not _is_left_out(path) for fault in faults_of(path.read_text("utf-8"), path)]
     found += twice({path: path.read_text("utf-8") for room in OURS for path in sorted((ROOT / room).rglob("*.py"))})
@@ -55,28 +55,28 @@ def _is_left_out(path: Path) -> bool:
 
 
 def faults_of(source: str, path: Path) -> list[str]:
-    """What is wrong with the identifiers of a file."""
+    """Faults of the identifiers in a file, one line each."""
     found = []
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         for word in _WORD.findall(token.string) if token.type == tokenize.NAME else ():
             if word.lower() in PRIVATE:
                 found.append(
-                    f"{path}:{token.start[0]}: {token.string}: {word} is {PRIVATE[word.lower()]}, docs/glossary.md"
+                    f"{path}:{token.start[0]}: {token.string}: {word} is {PRIVATE[word.lower()]}, see docs/glossary.md"
                 )
             elif BRITISH.search(word.lower()):
-                found.append(f"{path}:{token.start[0]}: {token.string}: identifiers are in American spelling")
+                found.append(f"{path}:{token.start[0]}: {token.string}: identifiers use American spelling")
     return found
 
 
 def twice(sources: Mapping[Path, str]) -> list[str]:
-    """Public classes whose name another class has, in these files."""
+    """Public classes in these files whose name is also another class's."""
     first: dict[str, Path] = {}
     found = []
     for path, source in sources.items():
         classes = [node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)]
         for node in classes:
             if not node.name.startswith("_") and (other := first.setdefault(node.name, path)) != path:
-                found.append(f"{path}:{node.lineno}: the class {node.name} is another in {other}")
+                found.append(f"{path}:{node.lineno}: the class {node.name} is also defined in {other}")
     return found
 
 

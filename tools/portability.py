@@ -1,4 +1,4 @@
-"""Run the tests as they would run on other machines: other linear algebra, instructions, locale, home, order, cores.
+"""Run the tests as on other machines: other linear algebra, instructions, locale, home, test order, cores.
 
     make portability                                    the numerical tests in every environment
     make portability ARGS="--only turkish --whole"      every test in one of them, the Unity suites included
@@ -6,8 +6,8 @@
     make portability ARGS=--another-blas                the estimation's tests, linear algebra unlike this machine's
     make portability ARGS=--list
 
-Each environment combines several differences, since a run costs minutes. One line an environment says at the end what
-passed. What can be had by no variable (a checkout in a folder with spaces) is run by hand, see docs/building.md.
+Each environment combines several differences, since a run costs minutes. One line per environment at the end tells the
+outcome. What no variable can set (a checkout in a folder with spaces) is run by hand, see docs/building.md.
 """
 
 import argparse
@@ -24,15 +24,15 @@ from resource import RUSAGE_CHILDREN, getrusage
 PROJECT = Path(__file__).resolve().parent.parent
 BUILD = PROJECT / "build" / "portability"
 NUMERICAL = ("lacuna", "robot", "simulate", "measure", "identify", "problem", "gait", "campaign", "report")
-ESTIMATION = ("lacuna", "identify")  # where linear algebra decides; short enough for every commit
+ESTIMATION = ("lacuna", "identify")  # the most sensitive to linear algebra; short enough for every commit
 NO_TESTS_RAN = 5  # pytest's exit status
 
-# OpenBLAS's kernels, and the instructions without which they cannot run. NumPy's and SciPy's wheels hold a few, and use
-# them for what is like them: Zen is their Haswell.
+# OpenBLAS's kernels, and the instructions that each requires. NumPy's and SciPy's wheels contain only a few, and use
+# these for similar processors: Haswell for Zen.
 KERNELS = {"Nehalem": "SSE42", "Haswell": "AVX2", "SkylakeX": "AVX512_SKX"}
 ALIKE = {"Zen": "Haswell", "Cooperlake": "SkylakeX", "SapphireRapids": "SkylakeX"}
 
-# Run in the environment: what it comes to. A variable that is ignored must not pass for a machine.
+# Run in the environment to verify it: a variable that is ignored must not pass for another machine.
 PROBE = """
 import json, locale, os, tempfile, time
 import numpy, scipy.linalg, threadpoolctl
@@ -41,7 +41,7 @@ try:
     language = locale.setlocale(locale.LC_ALL, "")
 except locale.Error:
     language = "unknown"
-def writable(folder):  # which os.access does not tell root
+def writable(folder):  # os.access would always say yes to root
     try:
         with tempfile.TemporaryFile(dir=folder):
             return True
@@ -66,8 +66,8 @@ print(json.dumps({
 
 @dataclass(frozen=True)
 class Environment:
-    """`variables` are set; `expected` is what the probe must then say. `plain`: numpy without the instructions that it
-    chooses at run time."""
+    """`variables` are set; `expected` is what the probe must then report. `plain`: numpy without the instructions that
+    it selects at run time."""
 
     name: str
     text: str
@@ -90,7 +90,7 @@ ENVIRONMENTS = (
         "bare",
         "BLAS Nehalem, numpy without AVX2 and AVX-512, locale C, a home that cannot be written",
         "Nehalem",
-        {"LC_ALL": "C", "HOME": "/proc"},  # where root cannot write either
+        {"LC_ALL": "C", "HOME": "/proc"},  # which even root cannot write to
         {"locale": "C", "instructions": [], "home": "not writable"},
         plain=True,
     ),
@@ -107,15 +107,15 @@ ENVIRONMENTS = (
 
 
 class RefusedError(Exception):
-    """This machine cannot be made into that one."""
+    """This machine cannot imitate that environment."""
 
 
 class IgnoredError(Exception):
-    """A variable had no effect: what then passes shows nothing."""
+    """A variable had no effect, so a pass would prove nothing."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the tests in the chosen environments; return 0 if every test passed in each that this machine can be."""
+    """Run the tests in the chosen environments; return 0 if all passed in each that this machine can imitate."""
     chosen = _arguments(arguments)
     if chosen.list:
         print("\n".join(f"{e.name:8}  {e.text}" for e in ENVIRONMENTS))
@@ -139,24 +139,24 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
         prog="make portability", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--only", action="append", choices=[e.name for e in ENVIRONMENTS], help="may be repeated")
-    parser.add_argument("--whole", action="store_true", help="every test and the Unity suites, not the numerical alone")
-    parser.add_argument("--another-blas", action="store_true", help="estimation only, by other linear algebra")
-    parser.add_argument("--list", action="store_true", help="say what there is")
+    parser.add_argument("--whole", action="store_true", help="every test, not just numerical ones, and Unity suites")
+    parser.add_argument("--another-blas", action="store_true", help="only estimation, with other linear algebra")
+    parser.add_argument("--list", action="store_true", help="list the environments")
     parser.add_argument("pytest", nargs="*", help=argparse.SUPPRESS)
     return parser.parse_args(arguments)
 
 
 def another_blas(probed: dict | None = None) -> Environment:
-    """The environment that differs from this machine's own in nothing but the kernels of its linear algebra."""
+    """The environment that differs from this machine only in the kernels of its linear algebra."""
     own = {ALIKE.get(kernel, kernel) for kernel in (probed or probe({**os.environ}))["blas"]}
     able = features()["features"]
     others = [name for name in ("Haswell", "Nehalem", "SkylakeX") if name not in own and KERNELS[name] in able]
-    kernel = (others or ["Nehalem"])[0]  # where none can be had, `settings` says so
+    kernel = (others or ["Nehalem"])[0]  # if none is available, `settings` says so
     return Environment("another BLAS", f"BLAS {kernel} in place of {', '.join(map(str, sorted(own, key=str)))}", kernel)
 
 
 def run(environment: Environment, tests: Sequence[str], *, unity: bool) -> tuple[int, str]:
-    """Run pytest, and the native Unity suites if `unity`, there; return a status, 0 if all is well, and one line."""
+    """Run pytest there, and the native Unity suites if `unity`; return a status, 0 if all passed, and one line."""
     begun = _processor_s()
     try:
         variables, cores = settings(environment)
@@ -185,7 +185,7 @@ def run(environment: Environment, tests: Sequence[str], *, unity: bool) -> tuple
 
 
 def settings(environment: Environment) -> tuple[dict[str, str], set[int]]:
-    """The variables and the cores that make this machine that one; RefusedError where that is not possible."""
+    """The variables and cores that make this machine imitate that one; RefusedError if that is not possible."""
     BUILD.mkdir(parents=True, exist_ok=True)
     variables = {**os.environ, **environment.variables}
     cores = set(sorted(os.sched_getaffinity(0))[: environment.cores])
@@ -198,7 +198,7 @@ def settings(environment: Environment) -> tuple[dict[str, str], set[int]]:
             raise RefusedError(f"this machine has no {needed}, which BLAS's {environment.kernel} needs")
         variables["OPENBLAS_CORETYPE"] = environment.kernel
     if environment.plain:
-        known = os.environ.get("NPY_DISABLE_CPU_FEATURES", "").split()  # as they are where this is run by itself
+        known = os.environ.get("NPY_DISABLE_CPU_FEATURES", "").split()  # set if this is run within such an environment
         variables["NPY_DISABLE_CPU_FEATURES"] = " ".join([*known, *(set(here["dispatched"]) & set(here["features"]))])
     language = environment.variables.get("LC_ALL", "C")
     if language != "C":
@@ -212,7 +212,7 @@ def settings(environment: Environment) -> tuple[dict[str, str], set[int]]:
 
 
 def probe(variables: dict[str, str], cores: set[int] | None = None) -> dict:
-    """What an interpreter says of itself there."""
+    """Report of an interpreter started with these variables and cores."""
     limit = (lambda: os.sched_setaffinity(0, cores)) if cores else None
     done = subprocess.run(
         [sys.executable, "-c", PROBE], env=variables, preexec_fn=limit, capture_output=True, text=True, check=False
@@ -229,7 +229,7 @@ def features() -> dict[str, list[str]]:
 
 
 def _locale(name: str) -> Path:
-    """A folder with the locale, made there: no right to install it is needed."""
+    """A folder containing the locale, compiled there, since installing it would need privileges."""
     made = BUILD / "locales" / name
     if not made.exists():
         made.parent.mkdir(exist_ok=True)

@@ -1,5 +1,5 @@
-"""Tests and benchmarks come in by the public door: python tools/private.py. They use no name that begins with an
-underscore: that one is gone would be seen by nobody before they run."""
+"""Check that tests and benchmarks use no private names: python tools/private.py. Names that begin with an underscore
+may disappear at any time, and nobody would notice before these programs run."""
 
 import ast
 import re
@@ -10,11 +10,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 GUESTS = [ROOT / "host" / name for name in ("benchmarks", "harness", "tests")]
 PATCHED = re.compile(r"(?:bifa|lacuna|harness|benchmarks|virtual_robot)\..*\._[a-z]\w*|_[a-z]\w*")
-OF_TUPLES = {"_replace", "_asdict", "_fields"}  # public, whatever they are called
+OF_TUPLES = {"_replace", "_asdict", "_fields"}  # public despite the underscore
 
 
 def main() -> int:
-    """Say where one of them uses a name that its owner keeps to itself."""
+    """Print where one of them uses a private name of another module."""
     found = [
         f"{path.relative_to(ROOT)}:{line}: {name} is private: reach it through what is public, or make it public"
         for folder in GUESTS
@@ -26,8 +26,8 @@ def main() -> int:
 
 
 def private_names(tree: ast.Module) -> Iterator[tuple[int, str]]:
-    """Lines and names of what is imported, read or patched from elsewhere and begins with an underscore; what a file
-    defines itself is its own."""
+    """Lines and names of imported, read or patched names that begin with an underscore, except those that the file
+    itself defines."""
     own = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute) and _is_own(node.value)}
     own |= {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
     for node in ast.walk(tree):

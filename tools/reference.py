@@ -22,12 +22,12 @@ def main() -> int:
 
 
 def page(package: str) -> Path:
-    """Where the page of a package is."""
+    """Path of a package's page."""
     return ROOT / "docs" / f"{package}-reference.md"
 
 
 def reference(package: str) -> str:
-    """The page as Markdown."""
+    """A package's page as Markdown."""
     exported = importlib.import_module(package)
     parts = [f"# Reference of {package}\n\nGenerated from the docstrings by `python tools/reference.py`."]
     parts += [

@@ -1,8 +1,8 @@
 """Run the Unity suites of one PlatformIO environment, and fail where PlatformIO would not notice.
 
-PlatformIO calls a suite that printed no result "skipped" and is content; here each suite must pass at least one
-test. It waits for ever for a chip that hangs or restarts again and again; here there is a limit. What a sanitizer finds
-it reports as a signal that never was; here its report is kept and its first lines are shown.
+PlatformIO calls a suite that printed no result "skipped" and succeeds; here each suite must pass at least one test. It
+waits forever for a chip that hangs or keeps restarting; here there is a time limit. It reports a sanitizer's finding as
+a signal that never occurred; here the sanitizer's report is kept and its first lines are shown.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ PROJECT = Path(__file__).resolve().parent.parent
 PIO = Path(sys.executable).with_name("pio")
 LIMIT_S = 1200
 SANITIZER_REPORTS = PROJECT / "build" / "sanitizer"
-NO_SIGNAL = 99  # PlatformIO takes a status of 1 for SIGHUP
+NO_SIGNAL = 99  # PlatformIO mistakes a status of 1 for SIGHUP
 
 
 def main(environment: str) -> int:
@@ -42,12 +42,12 @@ def main(environment: str) -> int:
 
 
 def sanitizer_reports() -> list[Path]:
-    """What the sanitizers wrote; they append the number of the process to the name."""
+    """The sanitizers' reports; they append the process id to the name."""
     return sorted(SANITIZER_REPORTS.parent.glob(f"{SANITIZER_REPORTS.name}.*"))
 
 
 def finding(report: str) -> str:
-    """What a sanitizer's report says: what happened, and where in the project (the first place there)."""
+    """Summary of a sanitizer's report: what happened, and the first place in the project."""
     what = re.search(r"(?:ERROR: |runtime error: )(.+?)(?: on address.*)?$", report, re.MULTILINE)
     where = re.search(r"in (\S.*? (?:lib|test)/\S+)|^((?:lib|test)/[^:]+:\d+)", report, re.MULTILINE)
     place = next((group for group in where.groups() if group), "?") if where else "an unknown place"
@@ -55,7 +55,7 @@ def finding(report: str) -> str:
 
 
 def run_limited(command: list, limit_s: float) -> int:
-    """Run `command`; return its status. On TimeoutExpired or an interrupt no process of it is left behind."""
+    """Run `command`; return its status. On TimeoutExpired or an interrupt, no process of it is left running."""
     options = f"log_path={SANITIZER_REPORTS}:exitcode={NO_SIGNAL}:print_stacktrace=1"
     environment = os.environ | {"ASAN_OPTIONS": options, "UBSAN_OPTIONS": options}
     with subprocess.Popen(command, cwd=PROJECT, env=environment, start_new_session=True) as process:

@@ -1,8 +1,8 @@
 """Build the sdist of each of the three packages, and the wheel from it: python tools/wheels.py [FOLDER].
 
-From a copy of what git lists, so that nothing is left in the tree and nothing that git does not know gets in. The one
-file that git does not know is the firmware's image, which `bifa flash` writes where there is no checkout: build that
-first (`make wheels` does, or `pio run -e uno`).
+Builds from a copy of the files that git lists, so that nothing is left in the tree and no other file gets in. The one
+exception is the firmware image, which `bifa flash` uses where there is no checkout: build it first (`make wheels`
+does, or `pio run -e uno`).
 """
 
 import argparse
@@ -22,23 +22,23 @@ SDIST = "import sys; from setuptools.build_meta import build_sdist; print(build_
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Build them, and print their paths."""
+    """Build the packages and print their paths."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "dist", help="where they go (default: dist/)")
+    parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "dist", help="output folder (default: dist/)")
     parser.add_argument("--no-build-isolation", action="store_true", help="build with the setuptools installed here")
-    parser.add_argument("--only", choices=PACKAGES, action="append", help="this package; may be given again")
-    parser.add_argument("--without-image", action="store_true", help="let bifa carry no firmware: it cannot be flashed")
+    parser.add_argument("--only", choices=PACKAGES, action="append", help="build only this package; may be repeated")
+    parser.add_argument("--without-image", action="store_true", help="build bifa without firmware: it cannot flash")
     given = parser.parse_args(arguments)
     image = None if given.without_image else IMAGE
     if image and not image.is_file():
-        parser.error(f"no {image.relative_to(ROOT)}: run `pio run -e uno`, or leave it out by --without-image")
+        parser.error(f"no {image.relative_to(ROOT)}: run `pio run -e uno`, or leave it out with --without-image")
     for path in build(given.folder, tuple(given.only or PACKAGES), image, isolated=not given.no_build_isolation):
         print(path)
     return 0
 
 
 def build(folder: Path, packages: tuple[str, ...], image: Path | None, isolated: bool = True) -> list[Path]:
-    """Put sdist and wheel of each package into `folder`; return their paths."""
+    """Put the sdist and wheel of each package into `folder`; return their paths."""
     folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="wheels-") as scratch:
@@ -50,7 +50,7 @@ def build(folder: Path, packages: tuple[str, ...], image: Path | None, isolated:
 
 
 def copy_tree(target: Path) -> Path:
-    """A copy of the files that git knows or would take up."""
+    """Copy the files that git tracks or would add to `target`; return it."""
     listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "host"]
     names = subprocess.run(listed, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
     for name in filter(None, names):

@@ -1,1 +1,1 @@
-"""Benchmarks: one topic a file `bench_<topic>.py`, offering `run() -> dict[str, float]`."""
+"""Benchmarks: one file `bench_<topic>.py` per topic, with `run() -> dict[str, float]`."""

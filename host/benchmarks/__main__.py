@@ -1,4 +1,4 @@
-"""`make bench`: run the benchmarks, print their figures, and merge them into bench.json at the top."""
+"""`make bench`: run the benchmarks, print their figures, and merge them into bench.json at the project's root."""
 
 import argparse
 import importlib
@@ -23,7 +23,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="make bench", description="Print every figure the project claims.")
     parser.add_argument("--only", metavar="TOPIC", choices=topics, help=f"run one: {', '.join(topics)}")
     only = parser.parse_args().only
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as on a machine where bifa has run before: modules are compiled
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as on a machine where bifa has run before, with bytecode cached
 
     failed = []
     for topic in [only] if only else topics:
@@ -44,7 +44,7 @@ def main() -> int:
 
 
 def merge(figures: dict[str, float], path: Path) -> None:
-    """Write `figures` (flat, name -> number) into the JSON file at `path`, keeping those of other benchmarks."""
+    """Write `figures` (flat, name -> number) into the JSON file at `path`, keeping the figures of other benchmarks."""
     known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     unfinished = path.with_suffix(".json.unfinished")
     unfinished.write_text(json.dumps(dict(sorted((known | figures).items())), indent=2) + "\n")

@@ -1,4 +1,4 @@
-"""Identifying the robot from a day of 45 trials: how long it takes, and its error beside the noise."""
+"""Identification of the robot from a day of 45 trials: its duration, and its error relative to the noise."""
 
 import tempfile
 import time

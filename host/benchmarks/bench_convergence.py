@@ -1,5 +1,5 @@
-"""Do fits find the optimum, wherever they begin? On sealed robots, with no effect and with each of four, 95 % of the
-starts are required to end within 1 % of the best cost found.
+"""Do fits find the optimum from any start? On sealed robots, with no effect and with each of four, 95 % of the starts
+are required to end within 1 % of the best cost found.
 
     python -m benchmarks.bench_convergence --starts 8 --only inclination
 """
@@ -22,7 +22,7 @@ _TO_THE_END = {"max_iterations": 40, "relative": 1e-4}
 
 
 def run(starts: int = STARTS, models=MODELS, seed: int = SEED) -> dict[str, float]:
-    """Print the share of each model; return that of all fits together and the processor's seconds for one."""
+    """Print the share for each model; return those, the share of all fits, and processor seconds per fit."""
     print(f"{'model':14s} {'trials':>6s} {'within 1 %':>10s}  {'worst':>8s}  {'a fit':>8s}  (required {REQUIRED:g})")
     found, spent, figures = [], [], {}
     with tempfile.TemporaryDirectory() as scratch:
@@ -48,7 +48,7 @@ def run(starts: int = STARTS, models=MODELS, seed: int = SEED) -> dict[str, floa
 
 
 def _problem(effect: str | None, seed: int, folder: Path):
-    """The trials that a diagnosis fits, of a sealed robot with `effect`, and the model that has it too."""
+    """A sealed robot with `effect`: the trials that a diagnosis would fit, with a model that has the effect too."""
     from bifa.data import read_dataset
     from bifa.identify.start import prepare
     from lacuna.diagnosis.split import split_trials
@@ -64,7 +64,7 @@ def _problem(effect: str | None, seed: int, folder: Path):
 
 
 def _fits(problem, starts: int, seed: int) -> tuple[np.ndarray, list[float]]:
-    """Cost of the fit from each start over the best one found, and the processor's seconds that each took."""
+    """For each start, the cost of its fit relative to the best one, and the processor seconds that it took."""
     from lacuna.estimation.fit import spread_starts
     from lacuna.estimation.graduated import solve_graduated
 
@@ -82,7 +82,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--starts", type=int, default=STARTS)
     parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--only", choices=["base", *filter(None, MODELS)], help="one model")
+    parser.add_argument("--only", choices=["base", *filter(None, MODELS)], help="run only this model")
     options = parser.parse_args()
     models = MODELS if options.only is None else (None if options.only == "base" else options.only,)
     run(options.starts, models, options.seed)

@@ -1,5 +1,5 @@
-"""Reading an hour of 100 Hz walking data, strictly, and as an export: time and memory beside
-those of NumPy's and pandas' own readers on the same file."""
+"""Reading an hour of 100 Hz walking data, strictly and as an export: time and memory compared with NumPy's
+and pandas' readers on the same file."""
 
 import csv
 import subprocess
@@ -61,8 +61,8 @@ def run() -> dict[str, float]:
 
 
 def _peak_mb(code: str, folder: str) -> float:
-    """What a process of its own needs at most while it reads, beyond what it had with all imported; NaN where the
-    system does not say."""
+    """Peak memory of a separate process while it reads, in MB beyond what its imports take; NaN where the system
+    does not report it."""
     if not Path("/proc/self/status").exists():
         return float("nan")
     program = f"import sys; import numpy, pandas; {IMPORTS}\n"

@@ -1,4 +1,4 @@
-"""The demo with ten seeds: see `benchmarks.demos`. Half an hour and more; an interrupted run goes on."""
+"""The demo with ten seeds: see `benchmarks.demos`. Takes half an hour or more; an interrupted run resumes."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ from benchmarks import demos
 
 
 def run() -> dict[str, float]:
-    """Print the table; returns the figures flat."""
+    """Print the table; return the figures flat."""
     return demos.run(range(demos.FIRST_SEED, demos.FIRST_SEED + demos.SEEDS), demos.OUT, demos.JOBS)

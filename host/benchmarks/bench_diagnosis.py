@@ -1,7 +1,7 @@
-"""What a person waits for: `bifa diagnose` and `bifa fit` on 45 sealed trials, from the command's start to its end.
+"""How long a person waits for `bifa diagnose` and `bifa fit` on 45 sealed trials, from the command's start to its end.
 
-One line a case: seconds by the clock, which say something on an idle machine, and seconds of processor, which hold on a
-busy one, each beside what is required.
+One line per case: wall-clock seconds, meaningful only on an idle machine, beside the requirement; and processor
+seconds, valid on a busy one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SEED = 7
 
 
 class TimedCommand(NamedTuple):
-    """A command on the data set drawn with these options; `required_s` by the clock, on two cores."""
+    """A command on the data set drawn with these options; `required_s`: wall-clock seconds on two cores."""
 
     key: str
     command: str
@@ -38,7 +38,7 @@ CASES = (
 
 
 def run() -> dict[str, float]:
-    """Print each case beside what is required; returns the figures flat."""
+    """Print each case beside its requirement; return the figures flat."""
     figures: dict[str, float] = {}
     print(f"{'45 trials':24}{'clock':>9}{'required':>10}{'processor':>11}   answer")
     with tempfile.TemporaryDirectory() as scratch:
@@ -54,7 +54,7 @@ def run() -> dict[str, float]:
 
 
 def _timed(case: TimedCommand, scratch: Path) -> tuple[float, float, str]:
-    """Seconds by the clock, seconds of processor, and what the command answered."""
+    """Wall-clock seconds, processor seconds, and the command's verdict."""
     folder, answer = scratch / case.key, scratch / f"{case.key}.json"
     sealed = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(SEED), "--out", str(folder), *case.drawn]
     subprocess.run(sealed, check=True)

@@ -1,4 +1,4 @@
-"""Gait optimisation on the nominal set: what is found, in how long, beside what is required and the paper's own."""
+"""Gait optimisation on the nominal parameters: speed and duration, compared with the requirements and the paper."""
 
 import os
 import time
@@ -19,8 +19,8 @@ SEEDS = range(int(os.environ.get("BIFA_BENCH_SEEDS", "2")))
 
 
 def run() -> dict[str, float]:
-    """Print each figure beside its peer or limit; return them flat. BIFA_BENCH_SEEDS=5 and BIFA_BENCH_ROBOTS=60 for the
-    whole proof."""
+    """Print each figure beside its peer or limit; return them flat. BIFA_BENCH_SEEDS=5 and BIFA_BENCH_ROBOTS=60 run
+    the full benchmark."""
     model, figures = nominal(), {}
     print(f"gait optimisation, {cores()} cores, {len(SEEDS)} seeds; load of the machine {os.getloadavg()[0]:.1f}")
     with simulations() as runs:
@@ -58,5 +58,5 @@ def run() -> dict[str, float]:
 
 
 def _warm_up(model, runs) -> None:
-    """Compile, outside the clock."""
+    """Compile before timing starts."""
     NominalSpeed(runs, plant(model), Settings().space, Settings().metric)(np.full((1, 5), 0.5))

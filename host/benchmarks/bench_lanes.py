@@ -1,5 +1,5 @@
-"""What a simulation costs in lanes, beside the same one alone in numba: processor seconds, so that what else runs on
-the machine counts for neither. Same robots, same times, same tolerance."""
+"""Cost of a simulation in lanes, compared with the same one alone in numba, in processor seconds, so that other load on
+the machine does not count. Same robots, same times, same tolerance."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from bifa.simulate.lanes import build, kernel
 from bifa.simulate.timeline import NO_COMMANDS
 
 TOLERANCE_M = 1e-6
-_NEAR, _FAR = 1e-4, 0.02  # relative, of each parameter: as for derivatives, and robots of a robust search
+_NEAR, _FAR = 1e-4, 0.02  # relative spread of each parameter: as in derivatives, and in a robust search
 _ROBOTS = 32
-_TRIES = 40  # short ones, of which some are not interrupted
+_TRIES = 40  # short enough that some are not interrupted
 
 
 def run() -> dict[str, float]:
-    """Print milliseconds a simulation; keys `lanes_<experiment>_speedup` and companions."""
+    """Print milliseconds per simulation; return `lanes_<experiment>_speedup_*` and more."""
     found = kernel.kernels()
     if found is None:
         return {}
@@ -53,7 +53,7 @@ def run() -> dict[str, float]:
 
 
 def _compiled() -> float:
-    """Seconds that both compilations take a processor, the compiler's own included."""
+    """Processor seconds of both compilations, the compiler's included."""
     with tempfile.TemporaryDirectory() as scratch:
         before_s = processor_s()
         for chosen in (build.target(), build.single()):

@@ -1,4 +1,4 @@
-"""The whole loop on every effect of the library: see `benchmarks.loop`. Two hours and more; resumes."""
+"""The whole loop on every effect of the library: see `benchmarks.loop`. Takes two hours or more; can be resumed."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ from benchmarks import loop
 
 
 def run() -> dict[str, float]:
-    """Print the table; returns the figures flat."""
+    """Print the table; return the figures flat."""
     return loop.run(loop.LIBRARY, range(loop.FIRST_SEED, loop.FIRST_SEED + loop.SEEDS), loop.OUT)

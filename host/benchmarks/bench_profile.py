@@ -1,7 +1,7 @@
-"""Where the time of a diagnosis goes, by what it says that it does: of the cases of `bench_diagnosis` with one effect
-and with one that nothing explains; and how much of a fit is the compiled kernel.
+"""Where a diagnosis spends its time, by the stages that it reports: for two cases of `bench_diagnosis`, one effect, and
+an effect that nothing explains; and the share of a fit spent in the compiled kernel.
 
-Processor seconds are of all processes; the clock says something on an idle machine only.
+Processor seconds are those of all processes; the clock is meaningful only on an idle machine.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from benchmarks.bench_diagnosis import CASES, SEED
 from benchmarks.cost import processor_s
 
 _CASES = {"diagnosis": "one effect", "diagnosis_unexplained": "nothing explains them"}
-_LIBRARY_WORDS = {"+", "nothing"}
 _LITTLE_S = 0.1
 
 
@@ -40,7 +39,7 @@ class _Stages:
 
 
 def run() -> dict[str, float]:
-    """Print the stages of each diagnosis and the kernel's share of a fit; returns the figures flat."""
+    """Print the stages of each diagnosis and the kernel's share of a fit; return the figures flat."""
     drawn = {case.key: case.drawn for case in CASES}
     figures: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as scratch:
@@ -55,7 +54,7 @@ def run() -> dict[str, float]:
 
 
 def _told(what: str, key: str, stages: _Stages) -> dict[str, float]:
-    """Print a table of stages; its figures, their names beginning with `key`."""
+    """Print a table of stages; return its figures, with names that begin with `key`."""
     print(f"{f'45 trials, {what}':52}{'clock':>8}{'processor':>11}{'cores':>7}")
     for stage, clock in stages.clock.items():
         if clock > _LITTLE_S:
@@ -85,19 +84,21 @@ def _diagnosed(folder: Path) -> _Stages:
     measured = read_dataset(folder)
     stages.begin("fitting the stiffness curves")
     system = prepare(measured)
-    words = _LIBRARY_WORDS | set(system.effects) | set(system.correction_sites)
+    words = {"+"} | set(system.effects) | set(system.correction_sites)
     diagnose(system, on_progress=lambda what: stages.begin(_without(what, words)))
     stages.begin("")
     return stages
 
 
 def _without(what: str, words: set[str]) -> str:
-    """What is being done, not what it is done to: "refitting hysteresis" is "refitting"."""
-    return " ".join(word for word in what.split() if word not in words and "_" not in word)
+    """The activity without its object: "refitting" for "refitting hysteresis"."""
+    return " ".join(
+        word for word in what.removesuffix(" the base model").split() if word not in words and "_" not in word
+    )
 
 
 def _kernel_share(folder: Path) -> float:
-    """Of the processor time of a base fit on one thread, the share that is spent in the compiled kernel."""
+    """Share of a base fit's processor time, on one thread, spent in the compiled kernel."""
     from bifa.data import read_dataset
     from bifa.identify.start import prepare
     from bifa.simulate.lanes.kernel import Kernel

@@ -1,4 +1,4 @@
-"""Lining up instruments: edges beside the bench's own time, and the lag of displacement for every effect there is."""
+"""Alignment of instruments: error of the strobe's edges, and the lag of displacement with every effect."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from virtual_robot.trials import Lab
 PERIOD_S = 0.01
 STARTS = 50
 SIZES = (0.5, 1.0, 2.0)
-LAGGING = "sensor_lag"  # moves the lag of all trials alike, as a shift between the instruments does
+LAGGING = "sensor_lag"  # shifts the lag of all trials alike, as a clock offset between instruments would
 
 
 def run() -> dict[str, float]:
@@ -26,9 +26,7 @@ def run() -> dict[str, float]:
     for effect in (None, *EFFECTS):
         lags = [lag for size in SIZES for lag in _lags_s(effect, size)]
         shifts[effect] = max(map(abs, lags), default=0.0)
-        shown = (
-            f"{1e3 * min(lags):+6.1f} to {1e3 * max(lags):+5.1f} in {len(lags)} trials" if lags else "not to be told"
-        )
+        shown = f"{1e3 * min(lags):+6.1f} to {1e3 * max(lags):+5.1f} in {len(lags)} trials" if lags else "undetermined"
         print(f"  {effect or 'none':20s} {shown}")
     return {
         "recording_edge_error_ms_worst": 1e3 * worst_s,
@@ -39,7 +37,7 @@ def run() -> dict[str, float]:
 
 
 def _worst_edge_s() -> float:
-    """Greatest error of an edge on the Uno's clock, judged by the bench's time, which no recording knows."""
+    """Largest error of an edge on the Uno's clock, judged by the bench's true time, which no recording knows."""
     with open_rig("virtual", profile="realistic") as rig, Uno(rig.transport, rig.clock) as uno:
         rig.instruments.start()
         clock = rig.instruments.clock

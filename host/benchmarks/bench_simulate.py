@@ -1,10 +1,10 @@
-"""How fast a gait is evaluated: the simulator against the paper's way, SciPy's LSODA with a Python right-hand side.
+"""Speed of evaluating a gait: the simulator against the paper's way, SciPy's LSODA with a Python right-hand side.
 
 Same model, same gaits, same four cycles, same run. The paper's eq. (5) needs a speed threshold, which it does not
-state. At 1e-2 m/s LSODA finishes, with a baseline half again too fast; at 1e-3 m/s it comes within a tenth of the right
-speed (at 1e-4 within 1 %) and often does not finish at all. Both are reported; the claim is made for 1e-3 m/s, since a
-wrong answer is no evaluation, and for the gaits that LSODA finishes, since for the others the ratio only says when it
-was stopped. Times are those of the processor, so that what else runs on the machine counts for neither side.
+state. At 1e-2 m/s LSODA finishes, but the baseline's speed is 50 % too high; at 1e-3 m/s it comes within 10 % of the
+right speed (at 1e-4 within 1 %) and often does not finish. Both are reported. The claim is made for 1e-3 m/s, since a
+wrong answer is no evaluation, and for the gaits that LSODA finishes, since for the others the ratio depends on when it
+was stopped. Times are processor times, so that other load on the machine counts for neither side.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from bifa.robot import Gait, Model, StiffnessCurve
 
 CYCLES = 4
 THRESHOLDS_M_S = (1e-2, 1e-3)
-LONGEST_S = 40.0  # after which LSODA is stopped
+LONGEST_S = 40.0  # LSODA is stopped after this time
 GAITS = (
     robot.BASELINE,
     Gait(2.516, 208.9, 331.9, 0.649, 0.4425, 0.4425),  # near the fastest
     Gait(3.4, 208.9, 331.9, 0.649, 0.4425, 0.4425),
 )
 SETTLED_CYCLES = 16
-SEARCHING_M, FINE_M, VERIFYING_M = 1e-5, 1e-6, 1e-7  # the integrator's tolerance in a step
+SEARCHING_M, FINE_M, VERIFYING_M = 1e-5, 1e-6, 1e-7  # tolerances of the integrator per step
 _GRAVITY = 9.80665
 
 
 def run() -> dict[str, float]:
-    """Print the comparison; keys `gait_evaluation_speedup`, `gait_evaluations_per_second` and companions."""
+    """Print the comparison; return `gait_evaluation_speedup`, `gait_evaluations_per_second` and more."""
     model = robot.nominal()
     rows = simulate.gait_rows(GAITS)
     simulate.speeds(model, rows, CYCLES)  # compiled, or read from the cache
@@ -108,15 +108,15 @@ def _our_time(model: Model, row: np.ndarray, times: int = 200) -> float:
 
 
 def _timed(job) -> tuple[float, float]:
-    """Seconds by the clock and of the processor."""
+    """Wall-clock and processor seconds."""
     clock, used = time.perf_counter(), time.process_time()
     job()
     return time.perf_counter() - clock, time.process_time() - used
 
 
 def _dealt(model: Model, batches: int = 8, batch: int = 50, pieces: int = 16) -> tuple[float, float]:
-    """How many times as fast two undisturbed threads could be, from what single gaits cost: a batch in two halves, and
-    in pieces that go to whoever is free."""
+    """Greatest possible speed-up by two undisturbed threads, given the costs of single gaits: with a batch split in two
+    halves, and in small pieces that go to whichever thread is free."""
     rows = simulate.gait_rows(paper_space().gaits(np.random.default_rng(0).random((batches * batch, 5))))
     costs = np.array([min(_our_time(model, row, 1) for _ in range(3)) for row in rows]).reshape(batches, batch)
     ends = np.zeros((2, batches))
@@ -130,14 +130,14 @@ def _dealt(model: Model, batches: int = 8, batch: int = 50, pieces: int = 16) ->
 
 
 def reference_error(model: Model, rows: np.ndarray, cycles: int, tolerance_m: float) -> float:
-    """The worst of the gaits by the advance in the last of `cycles`, against the verifying step."""
+    """Largest relative error over the gaits of the advance in the last of `cycles`, against the verifying step."""
     found = simulate.speeds(model, rows, cycles, tolerance_m).advance_m[:, -1]
     fine = simulate.speeds(model, rows, cycles, VERIFYING_M).advance_m[:, -1]
     return float(np.max(np.abs(found / fine - 1.0)))
 
 
 def papers_way(model: Model, gait: Gait, threshold_m_s: float) -> float:
-    """Eq. (1)-(8) as written, by LSODA between valve switches; m of the last cycle. TimeoutError if too long."""
+    """Eq. (1)-(8) as written, by LSODA between valve switches: advance in the last cycle, m. Raises TimeoutError."""
     right_hand_side = _RightHandSide(model, threshold_m_s)
     switches = simulate.of_gait(gait, CYCLES * gait.period_s)
     last = (CYCLES - 1) * gait.period_s
@@ -157,7 +157,7 @@ def papers_way(model: Model, gait: Gait, threshold_m_s: float) -> float:
 
 
 class _Spring:
-    """K(x) by `np.polyval`, straight outside."""
+    """K(x) by `np.polyval`, linear outside its range."""
 
     def __init__(self, curve: StiffnessCurve):
         self.lower, self.upper, self.threshold = curve.lower_m, curve.upper_m, curve.unstable_m
@@ -171,7 +171,7 @@ class _Spring:
 
 
 class _RightHandSide:
-    """Plain Python, as one writes it from the paper."""
+    """Plain Python, written straight from the paper."""
 
     def __init__(self, model: Model, threshold_m_s: float):
         self.threshold = threshold_m_s

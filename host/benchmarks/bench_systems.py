@@ -1,6 +1,6 @@
-"""lacuna beside what people use instead, on systems whose structural error is known, all in this run.
+"""lacuna compared with what people use instead, on systems with a known structural error, all in this run.
 
-Same records to fit, same candidates, same simulator for all; nobody sees what is judged by. See docs/compared.md.
+All get the same records to fit, candidates and simulator; nobody sees the held-out records. See docs/compared.md.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from benchmarks.systems.table import compare
 
 
 def run() -> dict[str, float]:
-    """Print a block for each system; returns the figures flat."""
+    """Print a block for each system; return the figures flat."""
     hidden = {name.split(".")[0] for name in spring.HIDDEN}
     problems = [spring.problem, lambda: spring.problem(withheld=hidden), lambda: spring.problem(hidden={})]
     problems += [emps.problem, tanks.problem, bouc_wen.problem]

@@ -1,6 +1,6 @@
 """The firmware's budgets, from the real image (and two small ones) in the simulated ATmega328P.
 
-Cycle counts are exact and repeat; the stack is measured by painting; flash and RAM come from the image.
+Cycle counts are exact and repeatable; the stack is measured by painting; flash and RAM come from the image.
 """
 
 import configparser
@@ -21,14 +21,14 @@ SOURCES = Path(__file__).parent / "uno"
 STROBE_PIN = 10
 SENSOR_ZERO_V = 2.5
 STEPS = 10240
-# Adafruit's own library over the stand-in that is used where it cannot be downloaded: flash and RAM, counted by
+# Flash and RAM that Adafruit's own library takes beyond the stand-in used where it cannot be downloaded, measured by
 # building both with the flags of platformio.ini.
 REAL_DAC_LIBRARY_BYTES, REAL_DAC_LIBRARY_RAM_BYTES = 858, 10
 FLASH_LIMIT, RAM_LIMIT, STACK_FREE_LIMIT = 29_000, 1_300, 300
 
 
 def board_at_rest() -> Board:
-    """The image, with three sensors that read zero."""
+    """A board with the image and three sensors that read zero."""
     board = Board(FIRMWARE)
     for channel in range(3):
         board.set_analog(channel, SENSOR_ZERO_V)
@@ -36,7 +36,7 @@ def board_at_rest() -> Board:
 
 
 def stimulate(board: Board, seconds: float) -> None:
-    """Let time pass with sensors that live: their last bit moves, so that nothing is taken for stuck."""
+    """Let time pass with working sensors, whose last bit toggles so that none is taken for stuck."""
     end = board.cycle + round(seconds * CLOCK_HZ)
     for turn in itertools.count():
         for channel in range(3):
@@ -48,14 +48,14 @@ def stimulate(board: Board, seconds: float) -> None:
 
 
 def build_flags() -> list[str]:
-    """The project's own flags of the image."""
+    """The project's build flags for the image."""
     settings = configparser.ConfigParser(interpolation=None)
     settings.read(PROJECT / "platformio.ini")
     return [flag for flag in settings["env:uno"]["build_flags"].split() if flag.startswith("-")]
 
 
 def cycles_of(source: str, seconds: float, *definitions: str) -> tuple[int, float, int]:
-    """Least, mean and most cycles of a step, compiled as the firmware is."""
+    """Minimum, mean and maximum cycles of a step, compiled like the firmware."""
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder) / "step.elf"
         includes = [f"-I{path}" for path in sorted((PROJECT / "lib").iterdir())]
@@ -67,14 +67,14 @@ def cycles_of(source: str, seconds: float, *definitions: str) -> tuple[int, floa
         board = Board(image)
         board.run_for(seconds)
         if board.asleep_s == 0:
-            raise RuntimeError(f"{source} did not come to its end in {seconds} s")
+            raise RuntimeError(f"{source} did not finish within {seconds} s")
         least, most, total = struct.unpack("<HHI", board.peek("result", 8))
         board.close()
     return least, total / STEPS, most
 
 
 def strobe_jitter() -> int:
-    """Peak to peak of the strobe's rising edges about a strict 10 ms, while walking, streaming and taking uploads."""
+    """Peak-to-peak jitter of the strobe's rising edges, in cycles, about 10 ms, walking, streaming and uploading."""
     board = board_at_rest()
     uno = connected(board)
     uno.run()
@@ -94,7 +94,7 @@ def strobe_jitter() -> int:
 
 
 def sleep_fraction(frames: bool, text: bool) -> float:
-    """How much of the time the chip sleeps while it walks and sends a frame or a line of text, or both, a sample."""
+    """Share of time that the chip sleeps while it walks and sends a frame, a line of text, or both per sample."""
     board = board_at_rest()
     uno = connected(board)
     uno.run()
@@ -111,7 +111,7 @@ def sleep_fraction(frames: bool, text: bool) -> float:
 
 
 def stack_free() -> int:
-    """Bytes that nothing has touched after text, frames, uploads, a save, a walk, a stop and a fault's report."""
+    """Bytes of stack left untouched by text, frames, uploads, a save, a walk, a stop and the report of a fault."""
     board = board_at_rest()
     for line in (
         b"help\n",

@@ -1,4 +1,4 @@
-"""The virtual bench: how much faster than real time, how exact, how soon a sealed data set is written."""
+"""The virtual bench: speed relative to real time, accuracy, and the time to write a sealed data set."""
 
 import tempfile
 import time

@@ -5,12 +5,12 @@
     python -m benchmarks.blind systems [...]     other systems than robots: python -m benchmarks.small_systems
 
 Each data set is drawn from its seed by `python -m virtual_robot.sealed`, or measured through the real firmware by
-`python -m harness.sealed_campaign` (`realistic`): single effects in turn, sizes and pairs at random, outside the
-library those never in it and, but for the foreign truth, each library effect in turn, withheld from the diagnosis.
-Verdicts, and what each diagnosis did when, are kept in FOLDER, so that an interrupted trial continues; FILE has a line
-for each data set, with which it continues on another machine, and `--print` only prints what is in it; beside it lies,
-packed, what each diagnosis tried, on which `python -m benchmarks.replay` tries rules of decision. Prints the figures
-with 95 % Wilson intervals beside four baselines that see the same fits: the best single refit by error, BIC, greedy
+`python -m harness.sealed_campaign` (`realistic`). Single effects come in turn, sizes and pairs at random; effects
+outside the library are those never in it and, except for the foreign truth, each library effect in turn, withheld from
+the diagnosis. FOLDER keeps verdicts and progress logs, so that an interrupted trial resumes. FILE has one line per data
+set, with which a trial resumes on another machine; `--print` only prints what is in it. Beside FILE, compressed, is
+what each diagnosis tried, for testing decision rules with `python -m benchmarks.replay`. Prints the figures with 95 %
+Wilson intervals, compared with four baselines that see the same fits: the best single refit by error, BIC, greedy
 forward selection, and sparse regression on the base model's residual.
 """
 
@@ -37,7 +37,7 @@ from benchmarks.search_record import searched, write_losses
 from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
 
-_STRIDE = 7  # through the effects: coprime to their numbers, so that relatives in the list are far apart
+_STRIDE = 7  # through the effects: coprime to their number, so that related ones come far apart
 _DRAWN_BY = {
     "own": ["-m", "virtual_robot.sealed"],
     "realistic": ["-m", "harness.sealed_campaign"],
@@ -48,7 +48,7 @@ _DRAWN_BY = {
 @dataclass(frozen=True)
 class Job:
     """One data set to draw. `kind` is "single", "none", "outside" or "pair"; `effect` None: drawn by the seed;
-    `withheld`: the diagnosis is not told of that effect."""
+    `withheld`: the effect is missing from the diagnosis's library."""
 
     truth: str
     kind: str
@@ -58,7 +58,7 @@ class Job:
 
 
 def jobs(truth: str, counts: dict[str, int], first_seed: int) -> list[Job]:
-    """Kinds mixed in proportion, so that a trial that was interrupted has some of each."""
+    """The jobs, kinds mixed in proportion, so that an interrupted trial has some of each."""
     effects = foreign if truth == "foreign" else own
     withheld = () if truth == "foreign" else own.LIBRARY
     outside = [*((name, False) for name in effects.OUTSIDE), *((name, True) for name in withheld)]
@@ -76,7 +76,7 @@ def jobs(truth: str, counts: dict[str, int], first_seed: int) -> list[Job]:
 
 
 def diagnose_sealed(job: Job, out: Path, threads: int) -> dict:
-    """Draw, diagnose on so many threads, and only then open the label. Returns the record kept for one data set."""
+    """Draw, diagnose on `threads` threads, and only then open the label. Return the record kept for the data set."""
     kept = out / f"{job.truth}-{job.kind}-{job.seed}.json"
     if kept.exists():
         return json.loads(kept.read_text())
@@ -103,7 +103,7 @@ def diagnose_sealed(job: Job, out: Path, threads: int) -> dict:
 
 
 def diagnose_one(folder: Path, verdict: Path, without: str | None, threads: int) -> None:
-    """The diagnosis of one folder with a library that lacks `without`, and what the baselines say of the same fits."""
+    """Diagnose one folder with a library that lacks `without`; write that and the baselines' answers to `verdict`."""
     from bifa.data import read_dataset
     from bifa.identify.start import prepare
     from lacuna.diagnosis.diagnose import diagnose
@@ -124,7 +124,7 @@ def diagnose_one(folder: Path, verdict: Path, without: str | None, threads: int)
 
 
 def baselines(search) -> dict[str, list[str]]:
-    """What simpler rules name: always something, for those that know no "none"."""
+    """The effects that simpler rules name; rules without a verdict "none" always name something."""
     singles = [c for c in search.tried if len(c.effects) == 1]
     by_error = min(singles or [search.base], key=lambda c: c.fitted.cost + c.checked.cost)
     by_bic = min(search.tried, key=_bic)
@@ -157,15 +157,15 @@ def main() -> None:
     parser.add_argument("--truth", choices=tuple(CLOSE), default="own", help="whose equations the robots follow")
     parser.add_argument("--first-seed", type=int, default=1000)
     cores = len(os.sched_getaffinity(0))
-    parser.add_argument("--jobs", type=int, default=cores, help="at once, which share the cores")
+    parser.add_argument("--jobs", type=int, default=cores, help="number run at once, sharing the cores")
     parser.add_argument("--out", type=Path, default=Path("../out/blind"))
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--json", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--without", help=argparse.SUPPRESS)
     parser.add_argument("--threads", type=int, help=argparse.SUPPRESS)
-    parser.add_argument("--records", type=Path, help="a line of JSON a data set; read first, and kept up to date")
-    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
-    parser.add_argument("--table", type=Path, metavar="FOLDER", help="the rates of all truths with records there")
+    parser.add_argument("--records", type=Path, help="one line of JSON per data set; read first, then kept up to date")
+    parser.add_argument("--print", action="store_true", help="only print what is in the records")
+    parser.add_argument("--table", type=Path, metavar="FOLDER", help="print the rates of all truths recorded there")
     options = parser.parse_args()
     if options.table:
         found = {truth: lines.read(options.table / f"{truth}.jsonl", "kind", "seed") for truth in CLOSE}
@@ -175,7 +175,7 @@ def main() -> None:
         diagnose_one(options.one, options.json, options.without, options.threads)
         return
     if options.print and not options.records:
-        parser.error("--print says what is in a file of records: add --records FILE")
+        parser.error("--print needs the records to print: add --records FILE")
     known = lines.read(options.records, "kind", "seed")
     if options.print:
         report(list(known.values()), options.truth)
@@ -201,7 +201,7 @@ def main() -> None:
                 )
         except KeyboardInterrupt:
             pool.shutdown(cancel_futures=True)
-            print(f"interrupted: what {len(records)} of {len(todo)} data sets say\n")
+            print(f"interrupted: figures of {len(records)} of {len(todo)} data sets\n")
     report(records, options.truth)
 
 

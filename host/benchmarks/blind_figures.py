@@ -1,4 +1,4 @@
-"""What a blind trial's records come to: rates with 95 % Wilson intervals, beside what is required and baselines."""
+"""Figures of a blind trial's records: rates with 95 % Wilson intervals, beside requirements and baselines."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import share_of_gap
 
-CLOSE = {"own": 1.2, "realistic": 1.2, "foreign": 1.3}  # floors that the error after may be, by truth
+CLOSE = {"own": 1.2, "realistic": 1.2, "foreign": 1.3}  # largest error after the diagnosis, in floors, by truth
 _ERRORS = ("held_out", "held_out_conditions")
 BASELINES = ("best single", "BIC", "greedy", "sparse regression")
 KINDS = ("single", "none", "outside", "pair")
@@ -42,9 +42,9 @@ _REQUIRED: dict[str, dict[str, str]] = {
 
 
 def brief(record: dict) -> dict:
-    """What a report needs of a record."""
+    """The part of a record that a report needs."""
     kept = ("kind", "seed", "truth", "sizes", "values", "base_values", "verdict", "processor_seconds", "baselines")
-    kept += tuple(name for name in ("version", "simulations") if name in record)  # of trials since they are counted
+    kept += tuple(name for name in ("version", "simulations") if name in record)  # absent from older trials
     estimated = record["base_parameters"]
     known = {
         name: {"interval_90": estimated[name]["interval_90"]} for name in record["base_values"] if name in estimated
@@ -56,7 +56,7 @@ def brief(record: dict) -> dict:
 
 
 def wilson(hits: int, of: int) -> tuple[float, float]:
-    """95 % interval of a share."""
+    """95 % Wilson interval of a share."""
     if of == 0:
         return 0.0, 1.0
     z, share = 1.96, hits / of
@@ -66,7 +66,7 @@ def wilson(hits: int, of: int) -> tuple[float, float]:
 
 
 def rates(records: Sequence[dict], truth: str) -> dict[str, list[bool]]:
-    """Hits and misses by what they are of."""
+    """Hits and misses by title."""
     single, none, outside, pair = ([r for r in records if r["kind"] == kind] for kind in KINDS)
     named, gaps = [r for r in single + pair if r["verdict"] == "identified"], [r for r in outside if _gap(r)]
     of_conditions = [r for r in named if r["error"]["noise_floor"]["held_out_conditions"]]
@@ -111,7 +111,7 @@ def report(records: Sequence[dict], truth: str) -> None:
 
 
 def table(records: Mapping[str, Sequence[dict]]) -> str:
-    """The rates of all truths in Markdown, each beside what is required of it."""
+    """The rates of all truths in Markdown, each beside its requirement."""
     found = {truth: rates(of, truth) for truth, of in records.items()}
     titles = [*found["own"]]
     titles.insert(titles.index(_IN_SET) + 1, _SIZE)
@@ -130,7 +130,7 @@ def table(records: Mapping[str, Sequence[dict]]) -> str:
 
 
 def _spent(records: Sequence[dict]) -> dict[str, list[float]]:
-    """Processor seconds by kind, rising."""
+    """Processor seconds by kind, in ascending order."""
     by_kind = {kind: sorted(r["processor_seconds"] for r in records if r["kind"] == kind) for kind in KINDS}
     return {kind: spent for kind, spent in by_kind.items() if spent}
 
@@ -140,13 +140,13 @@ def _median(rising: Sequence[float]) -> float:
 
 
 def _mean_size(records: Sequence[dict]) -> float:
-    """Effects reported, of robots with one effect of which something is named."""
+    """Mean number of effects reported, over robots with one effect for which something is named."""
     sizes = [len(reported(r)) for r in records if r["kind"] == "single" and r["effects"]]
     return sum(sizes) / max(len(sizes), 1)
 
 
 def share_text(hits: Sequence[bool]) -> str:
-    """How many of how many, with the interval; empty where there is none to count."""
+    """Hits of how many, with the interval; empty if there is nothing to count."""
     if not hits:
         return ""
     low, high = wilson(sum(hits), len(hits))
@@ -163,7 +163,7 @@ def _first(record: dict) -> str | None:
 
 
 def reported(record: dict) -> set[str]:
-    """What is named, and what the data cannot tell from it."""
+    """The effects named, and those that the data cannot distinguish from them."""
     return {name for e in record["effects"] for name in (e["name"], *e["confusable_with"])}
 
 
@@ -181,8 +181,8 @@ def plain(record: dict) -> bool:
 
 
 def _gap(record: dict) -> bool:
-    """Whether the base model misses the trials that informed nothing, or conditions that were never fitted, by more
-    than a tenth of the floor: what it misses by less is `none` by contract."""
+    """Whether the base model's excess error on final held-out trials, or on conditions never fitted, exceeds a tenth of
+    the floor (squared): anything smaller is `none` by contract."""
     error = record["error"]
     sides = [(error["before"][side], error["noise_floor"][side]) for side in _ERRORS]
     return any(before**2 - floor**2 > POLICY.relevance * floor**2 for before, floor in sides if before and floor)
@@ -193,7 +193,7 @@ def _ratio(record: dict, which: str = "held_out") -> float:
 
 
 def _covered(record: dict) -> list[bool]:
-    """Of each parameter of each effect that was named and is there, whether its interval holds the truth."""
+    """For each parameter of each correctly named effect, whether its interval contains the truth."""
     hits = []
     for effect in record["effects"]:
         for name, true in record["values"].get(effect["name"], {}).items():
@@ -203,13 +203,13 @@ def _covered(record: dict) -> list[bool]:
 
 
 def _base_covered(record: dict) -> list[bool]:
-    """Of each parameter of the base model, whether its interval holds the truth."""
+    """For each parameter of the base model, whether its interval contains the truth."""
     estimated, values = record["base_parameters"], record["base_values"]
     ends = {name: estimated[name]["interval_90"] for name in estimated if name in values}
     return [low <= values[name] <= high for name, (low, high) in ends.items()]
 
 
 def _closed(record: dict) -> float:
-    """The share of the gap; where there is none, nothing."""
+    """Share of the gap that was closed; 0 if there is no gap."""
     before, after, floor = (record["error"][which]["held_out"] for which in ("before", "after", "noise_floor"))
     return share_of_gap(before, after, floor) if before > floor else 0.0

@@ -1,10 +1,10 @@
-"""Whether the probability of walking is honest where it matters: at the cliff, robot by robot.
+"""Whether the probability of walking is calibrated where it matters: at the cliff, robot by robot.
 
     python -m benchmarks.cliff [--out ../out/loop] [--records FILE] [--print]
 
-Of every campaign that `benchmarks.loop` has left in OUT, the last gait is made faster until, by the last model, nearly
-all, most, half and few of the robots that are possible walk with it; each such gait is walked `RUNS` times, through the
-real firmware. FILE has a line for each robot, with which an interrupted run goes on.
+For every campaign that `benchmarks.loop` has left in OUT, the last gait is made faster until, by the last model, nearly
+all, most, half and few of the possible robots walk with it. Each such gait is walked `RUNS` times, through the real
+firmware. FILE has one line per robot, with which an interrupted run resumes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from bifa.robot.gait import Gait
 
 WANTED = (0.95, 0.8, 0.5, 0.2, 0.05)
 RUNS = 6
-_MOST_FASTER = 0.15  # part of the period, within which the cliff is looked for
+_MOST_FASTER = 0.15  # share of the period, within which the cliff is searched for
 _HALVINGS = 12
 _CYCLES = 12
 _STAGE = 70  # the first of the rig's numbers for these walks
@@ -39,7 +39,7 @@ _STAGE = 70  # the first of the rig's numbers for these walks
 
 @dataclass(frozen=True)
 class Step:
-    """One gait: by what part its period is shorter, the predicted probability of walking and interval, and the
+    """One gait: the share by which its period is shorter, the predicted probability of walking and interval, and the
     speeds of its runs; `walked`: which of them walk."""
 
     faster: float
@@ -50,14 +50,14 @@ class Step:
 
 
 def at_the_cliff(model: Model, gait: Gait) -> list[tuple[float, Prediction]]:
-    """Parts by which the period is shorter, and what is predicted there, for each of the probabilities `WANTED`;
-    none of a gait that all robots walk with however fast."""
+    """Shares by which the period is shorter, and the prediction there, for each of the probabilities `WANTED`; empty
+    for a gait that all robots walk with, however fast."""
     predictor = Predictor(model, spread_of(model))
 
     def predicted(faster: float) -> Prediction:
         return predictor.of(replace(gait, period_s=gait.period_s * (1.0 - faster)), cycles=_CYCLES)
 
-    least = FELL * predicted(0.0).speed_mm_s  # what falls may still creep
+    least = FELL * predicted(0.0).speed_mm_s  # a robot that falls may still creep
 
     def share(faster: float) -> float:
         return float(np.mean(predicted(faster).speeds_mm_s >= least))
@@ -75,7 +75,7 @@ def at_the_cliff(model: Model, gait: Gait) -> list[tuple[float, Prediction]]:
 
 
 def walked(folder: Path, effect: str, seed: int) -> list[Step]:
-    """The robot's steps over the cliff, from the campaign in `folder`."""
+    """Walk the robot's gaits over the cliff, from the campaign in `folder`."""
     model = load_model(folder / "model-last.toml")
     gait = Gait(**json.loads((folder / "rounds.json").read_text())[-1]["gait"])
     steps = []
@@ -94,13 +94,13 @@ HEADING = f"{'effect, seed':24}" + "".join(f"{f'{100 * wanted:.0f} %':>18}" for 
 
 
 def row(name: str, steps: Sequence[Step]) -> str:
-    """A line of the table under `HEADING`: by how many per cent the period is shorter, how many runs walked."""
+    """A line of the table under `HEADING`: by how many per cent the period is shorter, and how many runs walked."""
     cells = [f"-{100 * step.faster:.2f} %: {sum(step.walked)} of {len(step.walked)}" for step in steps]
     return f"{name:24}" + ("".join(f"{cell:>18}" for cell in cells) or "no cliff")
 
 
 def summed_up(found: Sequence[Sequence[Step]]) -> dict[str, float]:
-    """Predicted and walked share by `WANTED`, and the Brier score; printed and returned."""
+    """Print predicted and walked shares by `WANTED`, and the Brier score; return the figures."""
     with_cliff = [steps for steps in found if steps]
     if not with_cliff:
         return {}
@@ -127,7 +127,7 @@ def _walking(steps: Sequence[Step]) -> list[tuple[float, float, float]]:
 
 
 def run(out: Path, kept: Path | None = None, only_print: bool = False) -> dict[str, float]:
-    """Print the table, a line a robot; returns the figures flat."""
+    """Print the table, one line per robot; return the figures flat."""
     known = lines.read(kept, "robot")
     if not only_print:
         for rounds in sorted(out.glob("*/rounds.json")):
@@ -153,11 +153,11 @@ def main() -> None:
         prog="python -m benchmarks.cliff", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, default=loop.OUT, help="where benchmarks.loop keeps its campaigns")
-    parser.add_argument("--records", type=Path, help="a line of JSON a robot; read first, and kept up to date")
-    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    parser.add_argument("--records", type=Path, help="one line of JSON per robot; read first, then kept up to date")
+    parser.add_argument("--print", action="store_true", help="only print what is in the records")
     options = parser.parse_args()
     if options.print and not options.records:
-        parser.error("--print takes what is in a file of records: add --records FILE")
+        parser.error("--print needs the records to print: add --records FILE")
     run(options.out, options.records, options.print)
 
 

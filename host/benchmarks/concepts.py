@@ -1,6 +1,6 @@
-"""The pictures of docs/concepts.md, each from a run of its own: python -m benchmarks.concepts
+"""The figures of docs/concepts.md, each from its own run: python -m benchmarks.concepts
 
-Three are of the mass on a spring of `benchmarks.systems.spring`, one of a heated block whose power is limited.
+Three show the mass on a spring of `benchmarks.systems.spring`, one a heated block whose power is limited.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import lacuna
 from benchmarks.systems import spring
 from lacuna import CandidateExperiment, Effect, Parameter, Record, Verdict
 from lacuna.estimation.fit import Fit, evaluate_on
-from lacuna.report.style import Palette, figure_style
+from lacuna.report.style import Palette, look
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 WIDE = (7.6, 2.7)
@@ -27,9 +27,9 @@ SAMPLE_S = 0.5  # of the heated block
 
 
 def main() -> int:
-    """Draw all four; print what the text of the page says about them."""
+    """Draw all four; print the numbers that the page quotes."""
     for name, draw in (("floor", floor), ("held-out", held_out), ("gap", gap), ("confusable", confusable)):
-        with figure_style() as palette:
+        with look() as palette:
             import matplotlib.pyplot as plt
 
             figure, says = draw(palette)
@@ -42,7 +42,7 @@ def main() -> int:
 def diagnosed(
     hidden: Mapping[str, float], conditions: Iterable[tuple[str, float]], spare: Sequence[float] = ()
 ) -> Verdict:
-    """The mass on a spring with what it hides, three runs of each condition."""
+    """Diagnose the mass on a spring with `hidden` effects, from three runs of each condition."""
     draw = np.random.default_rng(0)
     records = [spring.measured(draw, hidden, shape, size, run) for shape, size in conditions for run in (1, 2, 3)]
     system = lacuna.System(
@@ -57,7 +57,7 @@ def diagnosed(
 
 
 def floor(palette: Palette) -> tuple[Any, str]:
-    """Three runs of one condition: what their residuals share, and what they differ by."""
+    """Three runs of one condition: what their residuals share, and how they differ."""
     import matplotlib.pyplot as plt
 
     verdict = diagnosed({"delay.delay_s": 0.01}, GENTLE)
@@ -80,7 +80,7 @@ def floor(palette: Palette) -> tuple[Any, str]:
 
 
 def held_out(palette: Palette) -> tuple[Any, str]:
-    """Errors by condition of the model as it is, of the best wrong explanation and of the right one."""
+    """Errors by condition of the base model, of the best wrong explanation, and of the right one."""
     import matplotlib.pyplot as plt
 
     conditions = [*(("steps", size) for size in (0.5, 1.0, 1.5)), ("sweep", 0.5), ("steps", 3.0), ("sweep", 3.0)]
@@ -113,7 +113,7 @@ def held_out(palette: Palette) -> tuple[Any, str]:
 
 
 def gap(palette: Palette) -> tuple[Any, str]:
-    """The mean square error before, what each effect takes away, and the floor."""
+    """The mean square error before, the share that each effect removes, and the floor."""
     import matplotlib.pyplot as plt
 
     verdict = diagnosed({"coulomb.force_N": 0.03, "delay.delay_s": 0.006}, GENTLE)
@@ -138,7 +138,7 @@ def gap(palette: Palette) -> tuple[Any, str]:
 
 
 def confusable(palette: Palette) -> tuple[Any, str]:
-    """A block that is heated late, or seen late: the same until its power meets the limit."""
+    """A block with a delayed heater or a delayed sensor: indistinguishable until its power reaches the limit."""
     import matplotlib.pyplot as plt
 
     verdict = _late_block()
@@ -167,7 +167,7 @@ def confusable(palette: Palette) -> tuple[Any, str]:
 
 
 def _late_block() -> Verdict:
-    """Three runs of steps and sweeps of 2 and 4 W, with larger ones on offer; the heater follows within 8 W."""
+    """Three runs of steps and sweeps of 2 and 4 W, with larger ones available; the heater is limited to 8 W."""
 
     def lag(samples: np.ndarray, tau_s: float) -> np.ndarray:
         kept = np.exp(-SAMPLE_S / tau_s) if tau_s > 0 else 0.0
@@ -217,7 +217,7 @@ def _words(effects: Sequence[str]) -> str:
 
 
 def _residuals(fitted: Fit, trials: Sequence[Record]) -> dict[str, np.ndarray]:
-    """Of each trial, by name, in mm."""
+    """Residuals by trial name, in mm."""
     return {name: channels[CHANNEL] for name, channels in evaluate_on(fitted, trials).residuals().items()}
 
 

@@ -1,4 +1,4 @@
-"""What work costs, by what no busy machine changes: how often a model was simulated, and seconds of the processor."""
+"""Measures of cost that a busy machine does not distort: number of simulations, and processor seconds."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 
 def processor_s() -> float:
-    """Seconds of the processor that this process has used, and its children that have ended."""
+    """Processor seconds used by this process and its terminated children."""
     return sum(used.ru_utime + used.ru_stime for used in map(getrusage, (RUSAGE_SELF, RUSAGE_CHILDREN)))
 
 
 class SimulationCount:
-    """A count that threads and forked children share."""
+    """A count shared by threads and forked children."""
 
     def __init__(self) -> None:
         self._count = get_context("fork").Value("q", 0)
@@ -28,7 +28,7 @@ class SimulationCount:
             self._count.value += number
 
     def of(self, simulate: Callable[..., Any]) -> Callable[..., Any]:
-        """`simulate`, counted once a call."""
+        """Wrap `simulate`, counting each call."""
 
         def counted(*given: Any) -> Any:
             self.add(1)
@@ -37,7 +37,7 @@ class SimulationCount:
         return counted
 
     def of_trials(self, system: Any) -> None:
-        """Count what a system simulates from now on: a trial once for each of its parameter values."""
+        """Count what `system` simulates from now on: each trial once per set of parameter values."""
         predict_trials = system.predict_trials
 
         def counted(thetas: Any, *given: Any, **how: Any) -> Any:

@@ -1,10 +1,10 @@
-"""Whether the README's story is one that a person can repeat: `bifa demo` with seed after seed, and what it came to.
+"""Whether the README's example is reproducible: `bifa demo` with several seeds, and the outcomes.
 
     python -m benchmarks.demos [--seeds 10] [--first-seed 1000] [--jobs 2] [--out ../out/demos] [--records FILE]
                                [--print]
 
 Each is a whole campaign through the real firmware on a robot with one undisclosed effect. Campaigns stay in OUT, so
-that an interrupted run goes on where it was; FILE has a line for each, with which it goes on on another machine.
+that an interrupted run resumes; FILE has one line for each, with which it resumes on another machine.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ SEEDS, FIRST_SEED, JOBS, OUT = 10, 1000, 2, Path("../out/demos")
 
 
 class Story(NamedTuple):
-    """A demo: what the seal held and what was named, errors on trials not fitted in units of the noise; the speed
-    walked with a margin of 2 %, and at the edge of what is known (of the campaign's last gait) predicted and walked."""
+    """A demo: the sealed and the named effects; errors on held-out trials, in units of the noise; the speed walked with
+    a margin of 2 %; and for the campaign's last gait, at the edge of what is known, the speeds predicted and walked."""
 
     seed: int
     truth: tuple[str, ...]
@@ -42,12 +42,12 @@ class Story(NamedTuple):
 
     @property
     def right(self) -> bool:
-        """Whether what the seal held is what was named first."""
+        """Whether the sealed effect was named first."""
         return self.named[:1] == self.truth[:1]
 
 
 def told(seed: int, out: Path) -> Story:
-    """Run the demo, or what is left of it to run."""
+    """Run the demo, or resume it."""
     folder = out / str(seed)
     folder.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "bifa", "demo", "--seed", str(seed), "--out", str(folder / "demo")]
@@ -57,7 +57,7 @@ def told(seed: int, out: Path) -> Story:
 
 
 def story(seed: int, summary: dict) -> Story:
-    """From a demo's `summary.json`."""
+    """Extract a story from a demo's `summary.json`."""
     robust, edge = summary["rounds"][0], summary["rounds"][-1]
     error = {name: summary["error"][name]["held_out"] for name in ("before", "after", "noise_floor")}
     return Story(
@@ -84,7 +84,7 @@ def row(one: Story) -> str:
 
 
 def summed_up(stories: Sequence[Story]) -> dict[str, float]:
-    """How many were right; printed and returned."""
+    """Print how many were right; return the figures."""
     right = sum(one.right for one in stories)
     low, high = wilson(right, len(stories))
     gain = mean(one.measured_mm_s / one.robust_mm_s for one in stories) - 1.0
@@ -94,7 +94,7 @@ def summed_up(stories: Sequence[Story]) -> dict[str, float]:
 
 
 def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) -> dict[str, float]:
-    """Print the table, a line as each demo ends; returns the figures flat."""
+    """Print the table, a line as each demo ends; return the figures flat."""
     known = lines.read(kept, "seed")
     print(HEADING)
     stories = []
@@ -118,13 +118,13 @@ def main() -> None:
     )
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
-    parser.add_argument("--jobs", type=int, default=JOBS, help="at once, which share the cores")
+    parser.add_argument("--jobs", type=int, default=JOBS, help="number run at once, sharing the cores")
     parser.add_argument("--out", type=Path, default=OUT)
-    parser.add_argument("--records", type=Path, help="a line of JSON a demo; read first, and kept up to date")
-    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    parser.add_argument("--records", type=Path, help="one line of JSON per demo; read first, then kept up to date")
+    parser.add_argument("--print", action="store_true", help="only print what is in the records")
     options = parser.parse_args()
     if options.print and not options.records:
-        parser.error("--print says what is in a file of records: add --records FILE")
+        parser.error("--print needs the records to print: add --records FILE")
     if options.print:
         run(sorted(lines.read(options.records, "seed")), options.out, 1, options.records)
     else:

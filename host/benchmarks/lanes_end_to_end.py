@@ -1,11 +1,11 @@
-"""What the lanes buy whoever runs a command, at equal work: each simulation is made in lanes, and again in numba alone.
+"""What the lanes save in whole commands, at equal work: each simulation runs in lanes, and again in numba alone.
 
     python -m benchmarks.lanes_end_to_end [--only TASK] [--seed 7]
 
-The search goes by the lanes' results, so that both did the same; left to itself, a fit of a model that is wrong ends
-elsewhere after the least difference. The data sets are sealed ones (`python -m virtual_robot.sealed --seed 7`): one
-effect of the library, and for the other diagnoses none, a pair, and one that the library lacks. Processor seconds of
-the command and its workers: what else runs on the machine counts little.
+The search uses the lanes' results, so that both do the same work; run separately, a fit of a wrong model would end
+elsewhere after the slightest difference. The data sets are sealed (`python -m virtual_robot.sealed --seed 7`): one
+effect of the library, and for the other diagnoses none, a pair, and one outside the library. Times are processor
+seconds of the command and its workers, so that other load on the machine counts little.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from bifa.simulate import lanes
 
 KINDS = ("one", "none", "pair", "outside")
 DIAGNOSES = tuple(f"diagnosis, {kind}" for kind in KINDS)
-TASKS = ("fit", "robust gait", *DIAGNOSES, "first run")  # in this order: the gait is sought on the fitted model
-_ALONE_M = 1e-6  # of derivatives: robots that do not share their steps need shorter ones
+TASKS = ("fit", "robust gait", *DIAGNOSES, "first run")  # in this order: the gait is optimized on the fitted model
+_ALONE_M = 1e-6  # for derivatives: robots that do not share their steps need shorter ones
 _FORK = multiprocessing.get_context("fork")
 _IMPORT = "import pandas, bifa.identify.identification, bifa.gait.search, lacuna.diagnosis.diagnose; "
 _COMPILE = "import numpy as np; from bifa import robot, simulate; simulate.walk(robot.nominal(), robot.BASELINE, 1)"
@@ -44,11 +44,11 @@ def main() -> int:
     parser.add_argument("--only", choices=TASKS)
     parser.add_argument("--seed", type=int, default=7)
     chosen = parser.parse_args()
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as on a machine where bifa has run before: modules are compiled
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as on a machine where bifa has run before, with bytecode cached
     with tempfile.TemporaryDirectory() as scratch:
         folder, model = Path(scratch), str(Path(scratch) / "model.toml")
         subprocess.run([sys.executable, "-c", _IMPORT + _COMPILE], env=os.environ | {"BIFA_LANES": "0"}, check=True)
-        # The margin is one that the work does not owe to what the fit, of a model that lacks an effect, knows.
+        # A fixed margin, so that the work does not depend on the uncertainty of a fit that lacks an effect.
         gait = ["optimize", "--model", model, "--spread", "0.02", "--out", str(folder / "gait.toml")]
         commands = {"fit": ["fit", str(folder / "one"), "--out", model], "robust gait": gait} | {
             task: ["diagnose", str(folder / kind), "--json", str(folder / "verdict.json")]
@@ -83,14 +83,14 @@ def _print(task: str, with_lanes: float, simulating: str, alone: float, simulati
 
 
 def _measured(words: Sequence[str]) -> tuple[float, float, float]:
-    """Processor seconds of a command, all its simulations made twice; and of these in lanes and in numba."""
+    """Processor seconds of a command that runs all simulations twice, and those spent in lanes and in numba."""
     times = _FORK.Array("d", 2)
     before_s = processor_s()
     process = _FORK.Process(target=_command, args=(words, times))
     process.start()
     process.join()
     if process.exitcode:
-        raise RuntimeError(f"bifa {' '.join(words)} ended with status {process.exitcode}")
+        raise RuntimeError(f"bifa {' '.join(words)} exited with status {process.exitcode}")
     return processor_s() - before_s, times[0], times[1]
 
 
@@ -121,7 +121,7 @@ def _command(words: Sequence[str], times: Any) -> None:
 
 
 def _compiling(switch: str) -> float:
-    """Processor seconds that a first simulation of each kind takes with an empty cache."""
+    """Processor seconds of a first simulation of each kind with an empty cache."""
     with tempfile.TemporaryDirectory() as empty:
         environment, before_s = os.environ | {"BIFA_LANES": switch, "BIFA_CACHE_DIR": empty}, processor_s()
         subprocess.run([sys.executable, "-c", _COMPILE], env=environment, check=True, stderr=subprocess.DEVNULL)

@@ -1,15 +1,15 @@
-"""What a completed model buys: gaits at the edge of what is known, found with the base and the completed model, walked.
+"""What a completed model gains: walks at the edge of what is known, by the base and the completed model.
 
     python -m benchmarks.loop [--effects hysteresis,leak] [--seeds 3] [--first-seed 200] [--out ../out/loop]
                               [--records FILE] [--print] [--plot PNG]
 
-For each effect of the library at its full size and each seed, a whole campaign through the real firmware, profile
-`realistic`, as `bifa campaign` runs it: another specimen of the robot, other noise. Five gaits are walked: the paper's
-baseline; with the base model, at the edge of its fit's covariance alone (naive, what people do) and of all that is
-known of it (fair: its remainder is large, and so its margin); with the completed model, robust against 2 % (what
-campaigns did before) and at the edge. Each has the interval and the probability of walking that its model predicted.
-Campaigns stay in OUT, so that an interrupted run goes on where it was; FILE has a line for each, with which it goes on
-on another machine. A run "walks" if it advances by at least four fifths of what was predicted, and by 1 mm/s.
+For each effect of the library at its full size and each seed, runs a whole campaign through the real firmware, profile
+`realistic`, as `bifa campaign` does, with another specimen of the robot and other noise. Five gaits are walked: the
+paper's baseline; with the base model, at the edge of its fit's covariance alone (naive, what people do) and at the edge
+of all that is known of it (fair: its remainder is large, and so is its margin); with the completed model, robust
+against 2 % (what campaigns used to do) and at the edge. For each, its model predicts an interval and the probability of
+walking. Campaigns stay in OUT, so that an interrupted run resumes; FILE has one line for each, with which it resumes on
+another machine. A run "walks" if it advances by at least four fifths of the prediction, and by 1 mm/s.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _LEVELS = (0.8, 0.9, 0.95)
 
 @dataclass(frozen=True)
 class Walked:
-    """One gait: predicted speed, its intervals by level, the probability of walking; the speeds of its runs."""
+    """One gait: predicted speed, its intervals by level, the probability of walking, and the speeds of its runs."""
 
     predicted_mm_s: float
     intervals_mm_s: dict[str, tuple[float, float]]
@@ -61,14 +61,14 @@ class Walked:
         return tuple(speed >= least for speed in self.runs_mm_s)
 
     def holds(self, level: float) -> list[bool]:
-        """Of the runs that walk, which lie in the interval."""
+        """For each run that walks, whether its speed lies in the interval."""
         low, high = self.intervals_mm_s[str(level)]
         return [low <= v <= high for v, walks in zip(self.runs_mm_s, self.walks, strict=True) if walks]
 
 
 @dataclass(frozen=True)
 class Gain:
-    """One robot: what was named, and its gaits by name."""
+    """One robot: the effects named, and its gaits by name."""
 
     effect: str
     seed: int
@@ -77,7 +77,7 @@ class Gain:
 
 
 def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) -> Gain:
-    """Run the campaign on the robot with `effect` at its full size, or what is left of it, and walk its gaits."""
+    """Run or resume the campaign on the robot with `effect` at its full size, and walk its gaits."""
     setup, folder = robot(effect, seed), out / f"{effect}-{seed}"
     stages = campaign(setup, effort or Effort(), lambda what, share: None)
     run_stages(folder, stages, on_start=_begun)
@@ -88,7 +88,7 @@ def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) ->
 
 
 def robot(effect: str, seed: int) -> Setup:
-    """A specimen with `effect` at its full size."""
+    """The setup of a specimen with `effect` at its full size."""
     values = EFFECTS[effect].at(1.0, np.random.default_rng([seed, 0x100]))
     return Setup(
         "virtual",
@@ -102,13 +102,13 @@ def _begun(stage: Stage) -> None:
 
 
 def walked(folder: Path, setup: Setup, effort: Effort) -> dict[str, Walked]:
-    """The gaits of a finished campaign in `folder`; those of the base model at its edge are found and walked here."""
+    """The gaits of a finished campaign in `folder`; the base model's gaits at its edge are found and walked here."""
     found = {"baseline": "walks-base", "robust": "walks-completed"}
     rounds = json.loads((folder / "rounds.json").read_text())
     if rounds[-1]["at_edge"]:
         found["edge"] = f"rounds/walks-{len(rounds)}"
     models = dict.fromkeys(("baseline", "robust"), "model-completed.toml") | {"edge": "model-last.toml"}
-    # As long as the campaign's longest walk: where a tether grows, a short one flatters.
+    # As long as the campaign's longest walk: with a tether that lengthens, short walks look too fast.
     least = max(_cycles(folder / place) for place in found.values())
     for number, (name, naive) in enumerate({"naive": True, "fair": False}.items()):
         _walk_base(folder, name, naive, setup, replace(effort, cycles=least), _STAGE + number)
@@ -150,7 +150,7 @@ HEADING = f"{'effect, seed':24}{'named':12}" + "".join(f"{title:>26}" for title 
 
 
 def row(one: Gain) -> str:
-    """A line of the table under `HEADING`: of each gait the interval predicted, the speed walked; * where runs fell."""
+    """A line of the table under `HEADING`: for each gait, interval predicted and speed walked; * if runs fell."""
     alone = "yes" if one.named == (one.effect,) else "and others" if one.effect in one.named else "no"
     cells = [_cell(one.gaits[name]) if name in one.gaits else "none" for name in GAITS]
     return f"{f'{one.effect}, {one.seed}':24}{alone:12}" + "".join(f"{cell:>26}" for cell in cells)
@@ -163,7 +163,7 @@ def _cell(gait: Walked) -> str:
 
 
 def summed_up(gains: Sequence[Gain]) -> dict[str, float]:
-    """Means over all robots, coverage of the intervals and calibration of the probabilities; printed and returned."""
+    """Print means over all robots, coverage of the intervals and calibration of the probabilities; return them."""
     figures: dict[str, float] = {"loop_robots": len(gains)}
     print(f"\n{f'robots: {len(gains)}':20}{'mm/s':>8}{'walk':>8}{'80 %':>8}{'90 %':>8}{'95 %':>8}{'Brier':>8}")
     for name, title in zip(GAITS, _TITLES, strict=True):
@@ -186,7 +186,7 @@ def _share(held: Sequence[bool]) -> float:
 
 
 def _against(gains: Sequence[Gain]) -> dict[str, float]:
-    """The completed model's edge against today's robust gait and against the better of the base model's."""
+    """Compare the completed model's edge with the robust gait and with the better of the base model's gaits."""
     pairs = [one.gaits for one in gains if "edge" in one.gaits]
     if not pairs:
         return {}
@@ -200,7 +200,7 @@ def _against(gains: Sequence[Gain]) -> dict[str, float]:
 
 
 def reliability(gains: Sequence[Gain], bins: Sequence[float] = (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)) -> list[tuple]:
-    """Predicted probability of walking against the share that walked: (mean predicted, share, runs) of each bin."""
+    """Reliability of the probability of walking: (mean predicted, share that walked, runs) of each bin."""
     pairs = np.array([(g.walks_probability, w) for one in gains for g in one.gaits.values() for w in g.walks], float)
     found = []
     for low, high in pairwise(bins):
@@ -211,7 +211,7 @@ def reliability(gains: Sequence[Gain], bins: Sequence[float] = (0.0, 0.5, 0.8, 0
 
 
 def plot(gains: Sequence[Gain], file: Path) -> None:
-    """The reliability plot."""
+    """Write the reliability plot to `file`."""
     from matplotlib.figure import Figure
 
     figure = Figure((4.0, 4.0), layout="constrained")
@@ -227,8 +227,8 @@ def plot(gains: Sequence[Gain], file: Path) -> None:
 
 
 def run(effects: Sequence[str], seeds: Sequence[int], out: Path, kept: Path | None = None) -> dict[str, float]:
-    """Print the table, a line as each campaign ends; returns the figures flat. Ctrl-C sums up what there is. `kept`:
-    the file of records."""
+    """Print the table, a line as each campaign ends; return the figures flat. Ctrl-C ends with a summary of those done.
+    `kept`: the file of records."""
     known = lines.read(kept, "effect", "seed")
     print(HEADING)
     gains = []
@@ -242,7 +242,7 @@ def run(effects: Sequence[str], seeds: Sequence[int], out: Path, kept: Path | No
                     known[effect, seed] = asdict(gains[-1])
                     lines.write(kept, known.values())
     except KeyboardInterrupt:
-        print(f"\ninterrupted after {len(gains)} of {len(effects) * len(seeds)} robots; the same command goes on")
+        print(f"\ninterrupted after {len(gains)} of {len(effects) * len(seeds)} robots; the same command resumes")
     return summed_up(gains) if gains else {}
 
 
@@ -255,19 +255,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.loop", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--effects", default=",".join(LIBRARY), help="names, with commas; default: all of the library")
+    parser.add_argument("--effects", default=",".join(LIBRARY), help="comma-separated names; default: whole library")
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--out", type=Path, default=OUT)
-    parser.add_argument("--records", type=Path, help="a line of JSON a campaign; read first, and kept up to date")
-    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    parser.add_argument("--records", type=Path, help="one line of JSON per campaign; read first, then kept up to date")
+    parser.add_argument("--print", action="store_true", help="only print what is in the records")
     parser.add_argument("--plot", type=Path, metavar="PNG", help="draw the reliability of the records' probabilities")
     options = parser.parse_args()
     effects = options.effects.split(",")
     if unknown := set(effects) - set(LIBRARY):
         parser.error(f"no effect {', '.join(sorted(unknown))}; there are {', '.join(LIBRARY)}")
     if (options.print or options.plot) and not options.records:
-        parser.error("--print and --plot take what is in a file of records: add --records FILE")
+        parser.error("--print and --plot need records: add --records FILE")
     if not options.print:
         seeds = range(options.first_seed, options.first_seed + options.seeds)
         run(effects, seeds, options.out, options.records)

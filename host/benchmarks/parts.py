@@ -1,7 +1,7 @@
-"""What each part of the image costs, by the symbols that the linker left.
+"""Flash and RAM taken by each part of the firmware image, by the symbols that the linker left.
 
-`python -m benchmarks.parts`. Link-time optimisation inlines across files: what a part has in `main` or in the tick is
-counted there. Vectors, start-up code and gaps are what no symbol claims.
+`python -m benchmarks.parts`. Link-time optimisation inlines across files: code inlined into `main` or the tick is
+counted there. Vectors, start-up code and gaps belong to no symbol.
 """
 
 import re
@@ -14,7 +14,7 @@ FIRMWARE = Path(__file__).resolve().parents[2] / ".pio/build/uno/firmware.elf"
 DATA_SPACE = 0x800000
 REST = "vectors, start-up, what no symbol claims"
 
-# The first that matches the demangled name.
+# The first pattern that matches the demangled name decides.
 PARTS = (
     ("the tick: oscillators, holds, valves, watches, samples", r"__vector_11$|bifa::kSineTable|under_way|round_begins"),
     (
@@ -58,7 +58,7 @@ PARTS = (
 
 
 def costs(firmware: Path = FIRMWARE) -> dict[str, tuple[int, int]]:
-    """Part -> bytes of flash, bytes of static RAM; together they are the image."""
+    """Part -> bytes of flash, bytes of static RAM; the sums are the image's."""
     listing = subprocess.run(["avr-nm", "-S", "-C", firmware], check=True, capture_output=True, text=True).stdout
     flash: Counter[str] = Counter()
     ram: Counter[str] = Counter()
@@ -69,7 +69,7 @@ def costs(firmware: Path = FIRMWARE) -> dict[str, tuple[int, int]]:
         part = _part_of(name)
         if address >= DATA_SPACE:
             ram[part] += size
-        if address < DATA_SPACE or kind in "dD":  # data that is not zero lies in flash, too
+        if address < DATA_SPACE or kind in "dD":  # initialized data is in flash, too
             flash[part] += size
     text, data, bss = sections(firmware)
     flash[REST] += text + data - flash.total()
@@ -78,7 +78,7 @@ def costs(firmware: Path = FIRMWARE) -> dict[str, tuple[int, int]]:
 
 
 def _part_of(name: str) -> str:
-    function = name.replace("(anonymous namespace)::", "").split("(")[0]  # not what it takes
+    function = name.replace("(anonymous namespace)::", "").split("(")[0]  # without its arguments
     return next((part for part, pattern in PARTS if re.search(pattern, function)), REST)
 
 
@@ -90,7 +90,7 @@ def sections(firmware: Path = FIRMWARE) -> tuple[int, int, int]:
 
 
 def lines() -> list[str]:
-    """The table."""
+    """The table, one line per part."""
     return [f"  {part:<58} {flash:>6} {ram:>6}" for part, (flash, ram) in costs().items()]
 
 

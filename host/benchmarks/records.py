@@ -1,4 +1,4 @@
-"""What a long trial found, a line of JSON a set, packed where the name ends in .gz, so that it goes on elsewhere."""
+"""Results of a long trial, one line of JSON per set, gzipped if the name ends in .gz, to resume it elsewhere."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 def read(path: Path | None, *names: str) -> dict[Any, dict]:
-    """Records by what they have under these names, as a tuple where there are several; none where there is no file."""
+    """Records keyed by their values of `names`, a tuple if there are several; empty if there is no file."""
     if path is None or not path.exists():
         return {}
     with _opened(path, path, "rt") as lines:
@@ -19,7 +19,7 @@ def read(path: Path | None, *names: str) -> dict[Any, dict]:
 
 
 def write(path: Path, records: Iterable[dict]) -> None:
-    """The file is the old one or the new one."""
+    """Write the records, replacing the file atomically."""
     new = path.with_suffix(".new")
     with _opened(new, path, "wt") as lines:
         lines.writelines(f"{json.dumps(rounded(record))}\n" for record in records)
@@ -32,7 +32,7 @@ def _opened(path: Path, named: Path, how: str) -> Any:
 
 
 def rounded(value: Any) -> Any:
-    """The same with six digits of every number that is no integer."""
+    """`value` with every float rounded to six significant digits."""
     if isinstance(value, dict):
         return {k: rounded(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

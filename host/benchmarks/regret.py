@@ -1,16 +1,16 @@
-"""How far gait searches end from the best that is known, robot by robot and seed by seed.
+"""Regret of gait searches against the best known gait, by robot and seed.
 
     python -m benchmarks.regret [--robots 60] [--seeds 5] [--long 5] [--fully 60] [--models DIR]
                                [--records FILE] [--print]
 
 Robots: the nominal one and the strong push, then specimens (5 % in every parameter) with each effect of the library at
 its usual size in turn, every tenth in a vertical pipe and every tenth before the tunnel; and every model-last.toml
-below DIR, the completed models that campaigns leave, whose robust searches are at the edge of what is known of them.
-The best known of a robot is the best of all its runs: of every seed, of `--long` searches of five times the budget, and
-of the peers (differential evolution, SciPy's DIRECT and SHGO) on as many evaluations as the search took in
-the mean. (nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) Robust
-searches and peers take ten times as long as nominal searches: `--fully` says on how many of the robots, evenly spread,
-they are tried. FILE has a line for each robot, with which a run goes on that was interrupted or searched fewer fully.
+below DIR, the completed models of campaigns, whose robust searches are at the edge of what is known of them. The best
+known gait of a robot is the best of all its runs: of every seed, of `--long` searches with five times the budget, and
+of the peers (differential evolution, SciPy's DIRECT and SHGO) with as many evaluations as the search took on average.
+(nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) Robust searches and
+peers take ten times as long as nominal searches: `--fully` sets on how many of the robots, evenly spread, they are
+run. FILE has one line per robot, with which a run resumes that was interrupted or searched fewer robots fully.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _JUDGED = 60
 
 
 def robots(count: int, models: Path | None = None) -> Iterator[tuple[str, Model, Settings]]:
-    """Name, model and how it is searched of each robot."""
+    """Name, model and search settings of each robot."""
     if models:
         for file in sorted(models.rglob("model-last.toml")):
             yield file.parent.relative_to(models).as_posix(), load_model(file), Settings(share=AT_EDGE)
@@ -62,7 +62,7 @@ def robots(count: int, models: Path | None = None) -> Iterator[tuple[str, Model,
 
 
 def specimen(seed: int) -> Model:
-    """A robot of the nominal kind."""
+    """A specimen of the nominal robot."""
     factors = 1.0 + _SPECIMEN * np.random.default_rng([seed, 44]).standard_normal(len(BASE_PARAMETERS))
     values = {n: nominal()[n] * f for n, f in zip(BASE_PARAMETERS, factors, strict=True)}
     values["mu_k"] = min(values["mu_k"], values["mu_s"])
@@ -78,9 +78,9 @@ def searched(
     runs: Simulations,
     fully: bool = True,
 ) -> dict[str, Any]:
-    """`record` with what it lacks: speeds of each seed, nominal and robust, of the long runs and of the peers;
-    processor seconds a search, and how many evaluations a nominal one took in the mean, which the peers have as well.
-    Not `fully`: the nominal ones only.
+    """Complete `record`: speeds of each seed, nominal and robust, of the long runs and of the peers; processor seconds
+    per search, and the mean number of evaluations of a nominal one, which is also the peers' budget. Not `fully`: only
+    the nominal searches.
     """
     record, spread = dict(record), None if model.covariance else SPREAD
     for kind, robust in (("nominal", False), ("robust", True))[: 1 + fully]:
@@ -104,7 +104,7 @@ def searched(
 
 
 def _found(model: Model, settings: Settings, runs: Simulations) -> tuple[float, int]:
-    """The speed that a search found, and how many gaits it tried."""
+    """Run a search; return the speed found, and how many gaits were tried."""
     try:
         found = optimize(model, runs, settings)
     except SearchError:
@@ -119,12 +119,12 @@ PEERS: dict[str, Callable[..., object]] = {
 
 
 class _SpentError(Exception):
-    """The budget."""
+    """The budget is spent."""
 
 
 def peer(minimize: Callable[..., object], model: Model, settings: Settings, budget: int, runs: Simulations) -> float:
-    """One of SciPy's on the search's own objective, for `budget` evaluations; the best of the gaits that it tried are
-    judged by the finer metric as well, as many as the search's own."""
+    """Run one of SciPy's optimizers on the search's own objective, for `budget` evaluations; as in the search, the best
+    of the gaits tried are judged again by the finer metric."""
     speed = NominalSpeed(runs, plant(model), settings.space, settings.metric)
     tried: list[tuple[float, np.ndarray]] = []
 
@@ -141,7 +141,7 @@ def peer(minimize: Callable[..., object], model: Model, settings: Settings, budg
 
 
 def regrets(record: dict) -> list[float]:
-    """Of every seed, nominal and robust, the part by which it is slower than the best known."""
+    """For every seed, nominal and robust, the share by which it is slower than the best known."""
     found = []
     for kind in (kind for kind in ("nominal", "robust") if kind in record):
         others = [record[name] for name in ("de", *PEERS) if name in record] if kind == "nominal" else []
@@ -180,8 +180,8 @@ def run(
     only_print: bool = False,
     every: int | None = None,
 ) -> dict[str, float]:
-    """Print the table, a line as each robot ends; returns the figures flat. Ctrl-C sums up what there is. `every`: how
-    many of them are searched fully; None: all."""
+    """Print the table, a line as each robot ends; return the figures flat. Ctrl-C ends with a summary of those done.
+    `every`: how many of the robots are searched fully; None: all."""
     known = lines.read(kept, "robot")
     print(HEADING)
     found: list[dict] = []
@@ -201,12 +201,12 @@ def run(
                 found.append(known[name])
                 print(row(name, known[name]), flush=True)
     except KeyboardInterrupt:
-        print(f"\ninterrupted after {len(found)} robots; the same command goes on")
+        print(f"\ninterrupted after {len(found)} robots; the same command resumes")
     return summed_up(found) if found else {}
 
 
 def summed_up(found: Sequence[dict]) -> dict[str, float]:
-    """Worst regret and the share of searches over one per cent; printed and returned."""
+    """Print the worst regret and the share of searches over one per cent; return the figures."""
     every = [regret for record in found for regret in regrets(record)]
     worst, share = max(every), mean(regret > ALLOWED for regret in every)
     print(
@@ -222,14 +222,14 @@ def main() -> None:
     )
     parser.add_argument("--robots", type=int, default=ROBOTS)
     parser.add_argument("--seeds", type=int, default=SEEDS)
-    parser.add_argument("--long", type=int, default=LONG, help="searches of five times the budget, of each kind")
-    parser.add_argument("--fully", type=int, help="of how many robots robust searches and peers as well; default: all")
-    parser.add_argument("--models", type=Path, help="folder below which model-last.toml are searched as well")
-    parser.add_argument("--records", type=Path, help="a line of JSON a robot; read first, and kept up to date")
-    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    parser.add_argument("--long", type=int, default=LONG, help="searches of each kind with five times the budget")
+    parser.add_argument("--fully", type=int, help="number of robots with robust searches and peers; default: all")
+    parser.add_argument("--models", type=Path, help="folder whose model-last.toml files are searched as well")
+    parser.add_argument("--records", type=Path, help="one line of JSON per robot; read first, then kept up to date")
+    parser.add_argument("--print", action="store_true", help="only print what is in the records")
     options = parser.parse_args()
     if options.print and options.records is None:
-        parser.error("--print says what is in a file of records: add --records FILE")
+        parser.error("--print needs the records to print: add --records FILE")
     run(options.robots, options.seeds, options.long, options.models, options.records, options.print, options.fully)
 
 

@@ -1,12 +1,12 @@
-"""Rules of decision, tried in seconds on what blind trials have kept, and how probabilities turned out.
+"""Test decision rules, in seconds, on the records of blind trials, and check how reliable probabilities were.
 
     python -m benchmarks.replay small.jsonl                                   every rule of benchmarks/rules.py
     python -m benchmarks.replay small.jsonl benchmarks/recorded/foreign.jsonl  on both together
-    python -m benchmarks.replay small.jsonl --rule my_rules:careful           a function of your own, beside them
-    python -m benchmarks.replay small.jsonl --reliability picture.png         probabilities against what is true
+    python -m benchmarks.replay small.jsonl --rule my_rules:careful           a function of your own as well
+    python -m benchmarks.replay small.jsonl --reliability picture.png         probabilities against the truth
 
 FILE is what `benchmarks.small_systems --records` or `benchmarks.blind --records` wrote; the losses of every explanation
-that was tried lie beside it (.losses.jsonl.gz). No model is simulated: a rule chooses among what the search had found.
+that was tried are beside it (.losses.jsonl.gz). No model is simulated: a rule chooses among what the search had found.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from benchmarks.rules import RULES, Rule
 from benchmarks.search_record import losses_beside
 
 _KINDS = {"single": "one effect", "none": "none", "outside": "withheld", "pair": "two", "decoys": "20 decoys"}
-_EDGES = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98, 1.0)  # of what probabilities are counted in
+_EDGES = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98, 1.0)  # of the bins of probabilities
 
 
 def searches(path: Path) -> list[dict[str, Any]]:
-    """What was tried of each set, with the `kind` of its truth, the effects on offer that are there (`truth`), and what
-    the verdict `named`."""
+    """The search record of each set, with the `kind` of its truth, the offered effects that are present (`truth`), and
+    those that the verdict `named`."""
     tried = lines.read(losses_beside(path), "kind", "seed")
     if not tried:
-        raise SystemExit(f"{losses_beside(path)}: nothing there. Run the trial with --records {path}.")
+        raise SystemExit(f"{losses_beside(path)}: no search records. Run the trial with --records {path}.")
     return [
         _joined(record, tried[key])
         for key, record in lines.read(path, "kind", "seed").items()
@@ -49,8 +49,8 @@ def _joined(record: dict[str, Any], tried: dict[str, Any]) -> dict[str, Any]:
 
 
 def replayed(found: Sequence[dict[str, Any]], rules: dict[str, Rule]) -> str:
-    """Of each rule, by kind of truth, how often it names exactly what is there and on offer; and how often something
-    that is not."""
+    """A table of rules: by kind of truth, how often each names exactly the effects that are present and offered; and
+    how often it names one that is absent."""
     kinds = [kind for kind in _KINDS if any(s["kind"] == kind for s in found)]
     heads = "".join(f"{_KINDS[kind]:12}" for kind in kinds)
     rows = [
@@ -69,7 +69,7 @@ def replayed(found: Sequence[dict[str, Any]], rules: dict[str, Rule]) -> str:
 
 
 def reliable(found: Sequence[dict[str, Any]], picture: Path | None) -> str:
-    """How often effects of each probability are there; and the same where what is there is on offer at all."""
+    """How often effects of each probability are present, for all sets and for those without a withheld effect."""
     offered = [s for s in found if s["kind"] != "outside"]
     if picture:
         draw(bins(*predicted(found)), picture)
@@ -89,7 +89,7 @@ def _reliable(found: Sequence[dict[str, Any]], of: str) -> str:
 
 @dataclass(frozen=True)
 class Bin:
-    """Effects whose probabilities lie between two edges: how many, their `mean`, and how many are there."""
+    """Effects whose probabilities lie between two edges: how many, their `mean`, and how many are present."""
 
     count: int
     mean: float
@@ -97,7 +97,7 @@ class Bin:
 
 
 def predicted(records: Sequence[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
-    """Of every effect of every explanation that was weighed, its probability, and whether it is there."""
+    """Probability of every effect in the explanations that were weighed, and whether it is present."""
     probability, there = [], []
     for record in records:
         weights = record["weights"]
@@ -108,19 +108,19 @@ def predicted(records: Sequence[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray
 
 
 def bins(probability: np.ndarray, there: np.ndarray) -> list[Bin]:
-    """By probability, those without an effect left out."""
+    """Effects binned by probability, without empty bins."""
     place = np.clip(np.searchsorted(_EDGES, probability, side="right") - 1, 0, len(_EDGES) - 2)
     found = [(probability[place == k], there[place == k]) for k in range(len(_EDGES) - 1)]
     return [Bin(len(p), float(p.mean()), int(t.sum())) for p, t in found if len(p)]
 
 
 def brier(probability: np.ndarray, there: np.ndarray) -> float:
-    """The mean squared difference between probability and truth; 0.25 for who always says one half."""
+    """The mean squared difference between probability and truth; 0.25 for a constant one half."""
     return float(np.mean((probability - there) ** 2))
 
 
 def draw(found: Sequence[Bin], path: Path) -> None:
-    """A picture: the share that is there against the probability, with 95 % intervals."""
+    """Write a plot of the share that is present against the probability, with 95 % intervals."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.2, 4.2), layout="constrained")
@@ -139,7 +139,7 @@ def draw(found: Sequence[Bin], path: Path) -> None:
 
 
 def own(spec: str) -> Rule:
-    """`module:function`, looked for where the command is run, too."""
+    """Import a rule given as `module:function`, also from the current folder."""
     sys.path.insert(0, str(Path.cwd()))
     module, _, name = spec.partition(":")
     try:
@@ -152,7 +152,7 @@ def main(given: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
     parser.add_argument("--rule", action="append", default=[], metavar="MODULE:FUNCTION", help="a rule of your own")
-    parser.add_argument("--reliability", type=Path, metavar="PNG", help="draw probabilities against what is true")
+    parser.add_argument("--reliability", type=Path, metavar="PNG", help="plot probabilities against the truth")
     options = parser.parse_args(given)
     found = [search for path in options.files for search in searches(path)]
     print(replayed(found, RULES | {spec: own(spec) for spec in options.rule}), end="\n\n")

@@ -1,6 +1,6 @@
-"""Rules of decision, each from what a search tried to the effects that it names.
+"""Decision rules: each maps what a search tried to the effects that it names.
 
-`search` is what `benchmarks.search_record` keeps. A rule of one's own is such a function:
+`search` is what `benchmarks.search_record` keeps. Any such function can be tested by
 `python -m benchmarks.replay --rule`.
 """
 
@@ -19,7 +19,7 @@ _CONFIDENCE = 0.95  # one-sided
 
 
 def least_cost(search: Search) -> Sequence[str]:
-    """The engine's own cost, and nothing else asked."""
+    """The explanation with the least cost, by the engine's own cost."""
     return min(search["tried"], key=lambda one: one["cost"])["effects"]
 
 
@@ -28,7 +28,7 @@ def bic(search: Search) -> Sequence[str]:
 
 
 def greedy(search: Search) -> Sequence[str]:
-    """BIC, an effect more at a time."""
+    """Forward selection by BIC, one effect at a time."""
     found = _base(search)
     while True:
         mine = set(found["effects"])
@@ -40,20 +40,21 @@ def greedy(search: Search) -> Sequence[str]:
 
 
 def heaviest(search: Search) -> Sequence[str]:
-    """The explanation of the largest weight; where none was weighed, nothing."""
+    """The explanation with the largest weight; nothing if none was weighed."""
     weighed = [(weight, effects) for effects, weight in search["weights"]]
     return max(weighed, key=lambda pair: pair[0])[1] if weighed else []
 
 
 def chosen(search: Search) -> Sequence[str]:
-    """What the engine chose before it asked whether that is supported."""
+    """The engine's choice, before it checked whether that is supported."""
     return search["chosen"]
 
 
 def within_confidence(search: Search) -> Sequence[str]:
-    """The smallest explanation that the best one does not beat beyond doubt on trials that it was not fitted to: the
-    differences of their losses by condition, and the standard error of these (cross-validation with confidence, Lei,
-    2020). A difference counts as a share of both losses, or the condition with the largest signal would be the doubt.
+    """The smallest explanation that the best one does not beat beyond doubt on held-out trials, judged by the
+    differences of their losses by condition and the standard error of these (cross-validation with confidence, Lei,
+    2020). Differences are taken relative to the sum of both losses, so that the condition with the largest signal does
+    not dominate the standard error.
     """
     losses = {k: _by_condition(search, one) for k, one in enumerate(search["tried"])}
     best = min(losses, key=lambda k: losses[k].sum())
@@ -72,7 +73,7 @@ def _not_beaten(difference: np.ndarray) -> bool:
 
 
 def _by_condition(search: Search, one: dict[str, Any]) -> np.ndarray:
-    """Losses of trials that were not fitted, summed over each condition."""
+    """Losses of held-out trials, summed over each condition."""
     judged = {*search["split"]["select"], *search["split"]["unseen"]}
     sums: dict[str, float] = {}
     for trial, condition, loss in zip(search["trials"], search["conditions"], one["losses"], strict=True):

@@ -1,6 +1,6 @@
-"""The search behind a verdict in plain types: what a rule of decision is tried on afterwards (`benchmarks.replay`).
+"""The search behind a verdict in plain types, on which decision rules are tested later (`benchmarks.replay`).
 
-The only place of the benchmarks that knows how the engine names what it tried.
+The only module of the benchmarks that depends on the engine's representation of a search.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ _DIGITS = 5
 
 
 def searched(diagnosis: Any, simulations: int) -> dict[str, Any]:
-    """Of every explanation tried: its whole cost (minus log-likelihood, with what parameters cost), the loss of each
-    trial (minus log-likelihood), and the RMS residual of those it was not fitted to, in units of the noise."""
+    """The record of a search: for every explanation tried, its total cost (minus log-likelihood, with that of the
+    parameters), the loss of each trial (minus log-likelihood), and the RMS residual of trials that it was not fitted
+    to, in units of the noise."""
     search, choice, split = diagnosis.search, diagnosis.choice, diagnosis.split
     trials = search.base.trials
     named = {(): search.base} | {c.effects: c for c in search.tried} | {choice.candidate.effects: choice.candidate}
@@ -52,12 +53,12 @@ def _short(value: float) -> float:
 
 
 def losses_beside(path: Path) -> Path:
-    """Where what was tried is kept: packed, beside the records of a trial."""
+    """Path of the search records: compressed, beside the records of a trial."""
     return path.with_suffix(".losses.jsonl.gz")
 
 
 def write_losses(path: Path, record: dict) -> None:
-    """Add what was tried of one data set to what lies beside `path`; records read from a file have none."""
+    """Add the search record of one data set to those beside `path`; records read from a file have none."""
     if "search" not in record:
         return
     known = lines.read(losses_beside(path), "kind", "seed")
@@ -68,7 +69,7 @@ def write_losses(path: Path, record: dict) -> None:
 
 @cache
 def version() -> str:
-    """The commit that this is run from, marked where something is changed; of an installed engine its version."""
+    """The commit of this checkout, marked if there are changes; for an installed engine, its version."""
     ask = ["git", "describe", "--always", "--dirty", "--abbrev=9"]
     found = subprocess.run(ask, cwd=Path(__file__).parent, capture_output=True, text=True)
     return found.stdout.strip() or lacuna.__version__

@@ -1,11 +1,11 @@
-"""What a verdict owes to each rule of decision: verdicts that change when the rule is halved or doubled.
+"""Sensitivity to each decision rule: verdicts that change when the rule's value is halved or doubled.
 
     python -m benchmarks.sensitivity                                     a fifth of a trial of small systems
     python -m benchmarks.sensitivity --first-seed 32000 --sets 1         all of one
 
-Small systems with repeats (`benchmarks.small_systems`), each searched once by the rules as they are; then what was
-tried is decided upon again under every rule halved and doubled (probabilities at most 0.99). A set counts as right
-where the verdict names exactly what is there and on offer.
+Small systems with repeats (`benchmarks.small_systems`), each searched once by the current rules; then the decision
+is repeated with every rule halved and doubled (probabilities at most 0.99). A set counts as right if the verdict
+names exactly the effects that are present and offered.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from lacuna.diagnosis.split import split_trials
 from lacuna.diagnosis.workers import Stoppable, Workers
 from lacuna.run import with_records
 
-SEARCH = ("implausible", "promising", "rival", "reach", "lost", "curve")  # rules that the search or a curve obeys
+SEARCH = ("implausible", "promising", "rival", "reach", "lost", "curve")  # rules of the search or of a curve
 FACTORS = (0.5, 2.0)
 
-Named = tuple[str, ...]  # what a verdict names, or the verdict itself
+Named = tuple[str, ...]  # effects that a verdict names, or the verdict itself
 Said = dict[tuple[str, float], Named]  # by rule and factor
 
 
 def _rules() -> list[Field]:
-    """Those of decision."""
+    """The rules of decision."""
     return [rule for rule in fields(Policy) if rule.name not in SEARCH]
 
 
 def variants() -> dict[tuple[str, float], Policy]:
-    """By rule and factor, the policy with that rule alone changed."""
+    """By rule and factor, the policy with only that rule changed."""
     found = {}
     for rule in _rules():
         for factor in FACTORS:
@@ -50,7 +50,7 @@ def variants() -> dict[tuple[str, float], Policy]:
 
 
 def names_under(offered: Offered, policies: dict[tuple[str, float], Policy]) -> Said:
-    """By policy, what the verdict names; `("", 1.0)` by the rules as they are."""
+    """What the verdict names under each policy; `("", 1.0)`: under the current rules."""
     system = with_records(offered.system(), offered.tables)
     case = Case(system, split_trials(system.trials, system.spare(), system.test()), POLICY, 0)
     hand = Stoppable(Workers(lambda _: None))
@@ -64,8 +64,8 @@ def names_under(offered: Offered, policies: dict[tuple[str, float], Policy]) -> 
 
 
 def table(every: list[tuple[Named, Said]]) -> str:
-    """Of each rule its value and unit, and for half and double of it the verdicts that change, and those that become
-    right and wrong; `every`: of each set what is right, and what was named by policy."""
+    """A table of rules: value, unit, and for half and double of it the number of verdicts that change, become right,
+    and become wrong. `every`: for each set, what is right, and what was named by policy."""
     rows = [f"{len(every)} sets, verdicts that change (of these: to right, to wrong)\n"]
     rows.append(f"{'rule':18}{'value':>8}  {'unit':44}{'halved':>16}{'doubled':>16}")
     for rule in _rules():

@@ -1,17 +1,17 @@
-"""Small systems of other kinds than robots, from seeds: what the engine says of them, and what others make of them.
+"""Small systems other than robots, from seeds: the engine's verdicts, and the answers of other methods.
 
     python -m benchmarks.small_systems --records small.jsonl                        a full trial, or the rest of one
     python -m benchmarks.small_systems --records small.jsonl --singles 7 --none 0 --withheld 0 --pairs 0 --decoys 0
-    python -m benchmarks.small_systems --records small.jsonl --print                only what is in it
-    python -m benchmarks.small_systems --show single 7003                           what a set is, its seal opened
-    python -m benchmarks.small_systems --records small.jsonl --against OTHER.jsonl  both, set by set
+    python -m benchmarks.small_systems --records small.jsonl --print                only print its figures
+    python -m benchmarks.small_systems --show single 7003                           show a set with its seal opened
+    python -m benchmarks.small_systems --records small.jsonl --against OTHER.jsonl  compare set by set
 
 Thermal, electrical, hydraulic, a drive, an oscillator, a battery, a reactor (`benchmarks/small/kinds`): one effect,
-none, one that is not on offer, two, or twenty decoys. Truths follow other formulas than the candidates and are
-integrated by other code; what nobody could tell is drawn again (`benchmarks/small/distinct.py`). Each goes through
-`lacuna.System` and `lacuna.diagnose` as a stranger's would. FILE has a line for each set and continues; beside it,
-packed, what the engine tried (FILE with .losses.jsonl.gz), for `python -m benchmarks.replay`. Prints the rates with 95
-% Wilson intervals.
+none, one that is not offered, two, or twenty decoys. Truths follow other formulas than the candidates and are
+integrated by other code; undecidable sets are redrawn (`benchmarks/small/distinct.py`). Each set goes through
+`lacuna.System` and `lacuna.diagnose` as any user's would. FILE has one line per set, and a trial resumes from it;
+beside it, compressed, is what the engine tried (.losses.jsonl.gz), for `python -m benchmarks.replay`. Prints the rates
+with 95 % Wilson intervals.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ COUNTS["decoys"] = ("decoys", 28)
 
 
 def jobs(counts: dict[str, int], first_seed: int) -> list[tuple[str, int]]:
-    """(truth, seed), the truths mixed in proportion, so that a trial that was interrupted has some of each."""
+    """(truth, seed) of each job, truths mixed in proportion, so that an interrupted trial has some of each."""
     placed = [
         ((k + 0.5) / count, truth, first_seed + 1000 * place + k)
         for place, (truth, count) in enumerate(counts.items())
@@ -44,7 +44,7 @@ def jobs(counts: dict[str, int], first_seed: int) -> list[tuple[str, int]]:
 
 
 def one(truth: str, seed: int, with_peers: bool) -> tuple[dict, dict]:
-    """The records of one set: what was said and is true, and what was tried."""
+    """The two records of one set: verdict and truth, and the search."""
     offered, sealed = drawn(truth, seed)
     said, tried, predict = diagnosed(offered)
     record = {"kind": truth, "seed": seed} | opened(offered, sealed) | said | {"version": version()}
@@ -55,7 +55,7 @@ def one(truth: str, seed: int, with_peers: bool) -> tuple[dict, dict]:
 
 
 def run(todo: list[tuple[str, int]], path: Path, with_peers: bool) -> list[dict]:
-    """What is not in the file yet; Ctrl-C leaves the file whole."""
+    """Run what is not in the file yet; Ctrl-C leaves the file intact."""
     known, losses = lines.read(path, "kind", "seed"), lines.read(losses_beside(path), "kind", "seed")
     compiled()
     began = time.monotonic()
@@ -82,14 +82,14 @@ def run(todo: list[tuple[str, int]], path: Path, with_peers: bool) -> list[dict]
 
 
 def compiled() -> None:
-    """Compile what is compiled at its first use, so that no set pays for it."""
+    """Trigger just-in-time compilation, so that no set's time includes it."""
     for seed in range(7):
         offered, _ = drawn("none", seed)
         offered.model(offered.records[0], {})
 
 
 def show(offered: Offered, sealed: Sealed) -> None:
-    """Print a set as its owner has it, and what is sealed."""
+    """Print a set as its owner has it, and its truth."""
     kind = offered.kind
     print(f"{offered.key}: {kind.name}, {kind.input} -> {kind.output}; {len(offered.runs)} records")
     for p in offered.parameters:
@@ -102,7 +102,7 @@ def show(offered: Offered, sealed: Sealed) -> None:
 
 
 def against(these: Path, others: Path) -> None:
-    """Print the sets of both files on which they differ."""
+    """Print the sets on which two files differ."""
     mine, theirs = lines.read(these, "kind", "seed"), lines.read(others, "kind", "seed")
     both = [key for key in mine if key in theirs]
     print(f"{len(both)} sets in both; said differently of:")
@@ -119,11 +119,11 @@ def main(given: list[str] | None = None) -> int:
     parser.add_argument("--first-seed", type=int, default=7000, metavar="SEED")
     parser.add_argument("--records", type=Path, default=Path("../out/small.jsonl"), metavar="FILE")
     parser.add_argument(
-        "--without-peers", action="store_true", help="the engine alone; without it, they are asked later"
+        "--without-peers", action="store_true", help="the engine alone; a later run without this adds the peers"
     )
-    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
-    parser.add_argument("--show", nargs=2, metavar=("TRUTH", "SEED"), help="one set, its seal opened")
-    parser.add_argument("--against", type=Path, metavar="FILE", help="sets of which another file says otherwise")
+    parser.add_argument("--print", action="store_true", help="only print the figures of the records")
+    parser.add_argument("--show", nargs=2, metavar=("TRUTH", "SEED"), help="show one set with its seal opened")
+    parser.add_argument("--against", type=Path, metavar="FILE", help="print sets with another verdict in this file")
     options = parser.parse_args(given)
     if options.show:
         try:
@@ -147,7 +147,7 @@ def main(given: list[str] | None = None) -> int:
         found = run(todo, options.records, not options.without_peers)
     except KeyboardInterrupt:
         found = list(lines.read(options.records, "kind", "seed").values())
-        print(f"interrupted: what {len(found)} sets say; the same command goes on\n")
+        print(f"interrupted: figures of {len(found)} sets; the same command resumes\n")
     report(found)
     return 0
 

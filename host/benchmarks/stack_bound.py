@@ -1,10 +1,10 @@
-"""How deep the stack of the image can become at most, from its instructions and its graph of calls.
+"""An upper bound of the firmware's stack depth, from the image's instructions and call graph.
 
 `python -m benchmarks.stack_bound` prints the deepest chain. Link-time optimisation merges functions across
-files, and what -fstack-usage writes down is from before that; so the frames are read off the final image.
+files, after -fstack-usage has written its figures; so the frames are read from the final image.
 
-The deepest is the main program's deepest chain, on it the tick (the only interrupt that lets others in), on that the
-next tick, which finds it under way and returns, and on that the deepest of the other interrupts, which do not nest.
+The bound is the sum of the main program's deepest chain, the tick's (the only interrupt that allows others), the next
+tick, which finds the first one running and returns, and the deepest of the other interrupts, which do not nest.
 """
 
 import re
@@ -17,16 +17,16 @@ from benchmarks.parts import FIRMWARE, sections
 
 RAM_BYTES = 2048
 RETURN_ADDRESS = 2
-SAVED_BY_PROLOGUE = 18  # r2 to r17, r28, r29 by libgcc's common prologue, entered the later the fewer are saved
+SAVED_BY_PROLOGUE = 18  # r2 to r17, r28, r29 by libgcc's common prologue; entered later, it saves fewer
 TICK = "__vector_11"
 LIBGCC = ("__prologue_saves__", "__epilogue_restores__", "__tablejump2__")
 
-# What is called through a pointer, by the function that does; whatever is not here is an error.
+# Functions called through a pointer, by caller; a caller that is not listed is an error.
 THROUGH_POINTERS = {
     "_ZN4bifa7Console11with_preset": ("_ZN4bifa8Commands4save", "_ZN4bifa8Commands4load", "_ZN4bifa8Commands6forget"),
-    "__vector_24": ("_ZN7TwoWire16onReceiveService", "_ZN7TwoWire16onRequestService"),  # as a slave, which nobody calls
+    "__vector_24": ("_ZN7TwoWire16onReceiveService", "_ZN7TwoWire16onRequestService"),  # as a slave: never addressed
     "_ZN7TwoWire5write": ("_ZN7TwoWire5writeEh",),
-    "_ZN7TwoWire": (),  # a user's callbacks, of which there are none
+    "_ZN7TwoWire": (),  # user callbacks; there are none
     "_ZN5Print": ("_ZN7TwoWire5write",),
     "main": ("_ZN7TwoWire5write",),  # the DAC's library
 }
@@ -34,7 +34,7 @@ THROUGH_POINTERS = {
 
 @dataclass
 class Function:
-    """One function of the image: its own bytes on the stack, and which it calls."""
+    """One function of the image: its own bytes on the stack, and its callees."""
 
     name: str
     frame: int = 0
@@ -43,7 +43,7 @@ class Function:
 
 
 def functions(listing: str) -> dict[str, Function]:
-    """The functions of a listing by `avr-objdump -d`."""
+    """The functions of an `avr-objdump -d` listing."""
     found: dict[str, Function] = {}
     current = None
     before: list[str] = []
@@ -69,14 +69,14 @@ def _take(function: Function, code: str, before: list[str]) -> None:
     elif word in ("icall", "eicall"):
         function.through_pointer = True
     elif word in ("call", "rcall", "jmp", "rjmp") and target and target[1] not in LIBGCC:
-        if word.endswith("call") or target[1] != function.name:  # a jump may be a call in the place of a return
+        if word.endswith("call") or target[1] != function.name:  # a jump may be a tail call
             function.calls.add(target[1])
     elif word in ("sbiw", "subi", "sbci") and "r2" in code and (room := _room(code, before)):
         function.frame += room
 
 
 def _room(code: str, before: list[str]) -> int:
-    """Bytes that an instruction takes off the stack pointer, a copy of which was read into r28 and r29 just before."""
+    """Bytes that an instruction subtracts from the stack pointer, copied into r28 and r29 just before."""
     number = int(re.search(r"0x([0-9a-f]+)", code, re.IGNORECASE)[1], 16)
     if before and before[-1].startswith("in r29, 0x3e") and code.startswith(("sbiw r28", "subi r28")):
         return number
@@ -86,7 +86,7 @@ def _room(code: str, before: list[str]) -> int:
 
 
 def _room_for_prologue(before: list[str]) -> int:
-    """The locals that libgcc's common prologue makes room for: r26 and r27."""
+    """Bytes of locals that libgcc's common prologue reserves, passed in r26 and r27."""
     room = 0
     for register, shift in (("r26", 0), ("r27", 8)):
         value = next(code for code in reversed(before) if code.startswith(f"ldi {register},"))
@@ -95,23 +95,23 @@ def _room_for_prologue(before: list[str]) -> int:
 
 
 def with_pointers(found: dict[str, Function]) -> None:
-    """Add what is called through pointers (THROUGH_POINTERS); ValueError if that is not known of a function."""
+    """Add the calls through pointers (THROUGH_POINTERS); ValueError for a function that is not listed there."""
     for function in found.values():
         if not function.through_pointer:
             continue
         targets = next((to for name, to in THROUGH_POINTERS.items() if function.name.startswith(name)), None)
         if targets is None:
-            raise ValueError(f"{function.name} calls through a pointer: add to THROUGH_POINTERS what")
+            raise ValueError(f"{function.name} calls through a pointer: add its targets to THROUGH_POINTERS")
         function.calls |= {name for name in found if name.startswith(targets or "-")}
 
 
 def deepest(found: dict[str, Function], name: str, above: tuple[str, ...] = ()) -> tuple[int, list[str]]:
-    """Bytes from a function's entry to the deepest that it or what it calls may come, and the chain.
+    """Deepest stack of a function and its callees, in bytes from its entry, and the chain of calls.
 
-    ValueError if something calls itself.
+    ValueError if a function is recursive.
     """
     if name in above:
-        raise ValueError(f"{name} calls itself by way of {', '.join(above)}")
+        raise ValueError(f"{name} calls itself through {', '.join(above)}")
     function = found[name]
     most, chain = 0, []
     for callee in function.calls & found.keys():
@@ -122,7 +122,7 @@ def deepest(found: dict[str, Function], name: str, above: tuple[str, ...] = ()) 
 
 
 def bound(firmware: Path = FIRMWARE) -> tuple[int, list[str]]:
-    """The deepest that the stack can become, in bytes, and the chains that make it so."""
+    """The bound in bytes, and the chains that add up to it."""
     listing = subprocess.run(["avr-objdump", "-d", firmware], check=True, capture_output=True, text=True).stdout
     found = functions(listing)
     with_pointers(found)
@@ -139,13 +139,13 @@ def bound(firmware: Path = FIRMWARE) -> tuple[int, list[str]]:
 
 
 def room() -> int:
-    """Bytes that static data leaves to the stack."""
+    """Bytes that static data leaves for the stack."""
     _, data, bss = sections()
     return RAM_BYTES - data - bss
 
 
 def main() -> int:
-    """Print the bound and its chains; return 1 if the stack could meet the static data."""
+    """Print the bound and its chains; return 1 if the stack could reach the static data."""
     most, chains = bound()
     print(*chains, sep="\n")
     print(f"{most} bytes at most, of {room()}")

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from bifa.version import __version__
 
-_WHERE = {  # imported when first asked for: a command waits only for what it uses
+_WHERE = {  # imported on first use, so that a command loads only what it needs
     **dict.fromkeys(("load_dataset", "Robot", "connect"), "bifa.notebook"),
     **dict.fromkeys(("Gait", "BASELINE", "load_gait", "save_gait"), "bifa.robot.gait"),
     "BifaError": "bifa.errors",
 }
 __all__ = ["__version__", *_WHERE]
 
-if TYPE_CHECKING:  # the same, for those who read types
+if TYPE_CHECKING:  # the same names, for type checkers
     from bifa.errors import BifaError as BifaError
     from bifa.notebook import Robot as Robot
     from bifa.notebook import connect as connect

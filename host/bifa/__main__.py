@@ -4,7 +4,7 @@ import sys
 
 
 def main() -> None:
-    """The command; Ctrl-C while it is still being loaded ends it without a traceback."""
+    """Run the command `bifa`; Ctrl-C while it is still being loaded ends it without a traceback."""
     try:
         from bifa.cli import main as command
     except KeyboardInterrupt:

@@ -1,7 +1,7 @@
-"""A dask cluster as a `concurrent.futures.Executor`, for those who outgrow one machine.
+"""A dask cluster as a `concurrent.futures.Executor`, for work that outgrows one machine.
 
 Both ends unpickle what the other sends: whoever answers at the address can run code here, and whoever reaches the
-scheduler can run code there. With TLS both have to show a certificate of your own authority.
+scheduler can run code there. With TLS both have to present a certificate signed by your own authority.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any
 from bifa.errors import BifaError
 
 HELP = (
-    "Address of a dask scheduler, to use its workers. Both ends run what the other sends (pickle): only one that you "
-    "trust, and over a network only with TLS (tls://...)."
+    "Address of a dask scheduler, to use its workers. Both ends run what the other sends (pickle): use only one that "
+    "you trust, and over a network only with TLS (tls://...)."
 )
-CA_HELP = "For --dask tls://...: the authority's certificate (PEM) that the cluster's must be signed by."
-CERT_HELP = "For --dask tls://...: the certificate (PEM) that this computer shows."
+CA_HELP = "For --dask tls://...: certificate (PEM) of the authority that must have signed the cluster's certificate."
+CERT_HELP = "For --dask tls://...: the certificate (PEM) that this computer presents."
 KEY_HELP = "For --dask tls://...: the key of --dask-cert."
 
 
@@ -30,7 +30,7 @@ class ClusterError(BifaError):
 
 @dataclass(frozen=True)
 class Tls:
-    """The three PEM files that distributed asks for; where all are None, its own configuration counts
+    """The three PEM files that distributed needs; if all are None, its own configuration applies
     (`distributed.comm.tls` in dask's YAML files or `DASK_DISTRIBUTED__COMM__TLS__...`)."""
 
     ca: Path | None = None
@@ -38,7 +38,8 @@ class Tls:
     key: Path | None = None
 
     def security(self) -> Any:
-        """The security settings for distributed; None leaves them to its configuration. Raises ClusterError."""
+        """Return the security settings for distributed, or None to leave them to its own configuration. Raises
+        ClusterError if a file is missing."""
         files = {"--dask-ca": self.ca, "--dask-cert": self.cert, "--dask-key": self.key}
         given = {name: file for name, file in files.items() if file is not None}
         if not given:
@@ -60,17 +61,18 @@ class Tls:
 
 @contextmanager
 def cluster(address: str, tls: Tls = Tls()) -> Iterator[tuple[Executor, int]]:
-    """The cluster whose scheduler is at `address`, and how many threads it has. Raises ClusterError."""
+    """Connect to the cluster whose scheduler is at `address`; yields its executor and its number of threads. Raises
+    ClusterError if that fails."""
     try:
         from distributed import Client
     except ImportError:
         raise ClusterError("--dask needs the package distributed: pip install 'bifa[dask]'") from None
     security = tls.security()
     if security is not None and not address.startswith("tls://"):
-        raise ClusterError(f"with --dask-ca, --dask-cert and --dask-key the address begins with tls://, not {address}")
+        raise ClusterError(f"--dask-ca, --dask-cert and --dask-key need an address tls://..., not {address}")
     try:
         client = Client(address, timeout="10s", security=security)
-    except (OSError, ValueError, TypeError, RuntimeError) as error:  # also a certificate that does not fit
+    except (OSError, ValueError, TypeError, RuntimeError) as error:  # also if certificates do not match
         raise ClusterError(
             f"no dask scheduler answers at {address}: {error}; start one with `dask scheduler`"
         ) from None
@@ -80,6 +82,6 @@ def cluster(address: str, tls: Tls = Tls()) -> Iterator[tuple[Executor, int]]:
             raise ClusterError(
                 f"the dask scheduler at {address} has no workers; start some with `dask worker {address}`"
             )
-        # Code is compiled once a process; calls with equal arguments give equal results, which are not worth keeping.
+        # Code is compiled once per process. Equal calls give equal results, but caching them is not worth it.
         with client.get_executor(pure=False) as executor:
             yield executor, count

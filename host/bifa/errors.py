@@ -1,4 +1,4 @@
-"""The root of every error that bifa expects: its text says what is wrong and what to do."""
+"""Base class of all errors that bifa anticipates; their texts say what is wrong and what to do."""
 
 from bifa.printable import printable
 
@@ -13,5 +13,5 @@ class BifaError(Exception):
 def check_range(error: type[BifaError], name: str, value: float, lower: float, upper: float, unit: str = "") -> None:
     """Raise `error`, naming the range, unless `value` is a finite number within it."""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not lower <= value <= upper:  # NaN is not; and an integer may be too long for a float
+    if not number or not lower <= value <= upper:  # also refuses NaN, and integers too large for a float
         raise error(f"{name} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())

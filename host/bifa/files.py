@@ -1,4 +1,4 @@
-"""Files that people ask for: their places checked before long work, and written whole or not at all; a full disk."""
+"""Output files: checked before long work, written completely or not at all, with a clear error if the disk is full."""
 
 import errno
 import os
@@ -18,22 +18,22 @@ _FULL = tuple(getattr(errno, name) for name in ("ENOSPC", "EFBIG", "EDQUOT") if 
 
 
 def is_stray(name: str) -> bool:
-    """Whether an operating system, an editor or an office program leaves files of this name behind, unasked:
-    .DS_Store, ._x.csv, .~lock.x.csv#, ~$x.xlsx, Thumbs.db."""
+    """Whether operating systems, editors or office programs leave files of this name behind: .DS_Store, ._x.csv,
+    .~lock.x.csv#, ~$x.xlsx, Thumbs.db."""
     return name.startswith((".", "~$")) or name in _STRAYS
 
 
 class TargetError(BifaError):
-    """A file cannot be written where it was asked for; the text says why."""
+    """A file cannot be written to the requested place; the text says why."""
 
 
 def check_targets(
     *files: Path | None, folders: tuple[Path | None, ...] = (), inputs: tuple[Path | None, ...] = ()
 ) -> None:
-    """Raise TargetError unless each of `files` can be written, and each of `folders` written into or made.
+    """Raise TargetError unless each of `files` can be written, and each of `folders` can be written into or created.
 
-    None is skipped, so that a command hands over its options as they are. A data set's files, and `inputs`, which the
-    same command reads, are not replaced, and no two targets are the same place.
+    None is skipped, so that a command can pass its options unchanged. Files of a data set, and `inputs`, which the same
+    command reads, must not be replaced, and no two targets may be the same.
     """
     read = {path.resolve() for path in inputs if path is not None}
     targets, made = ([path for path in paths if path is not None] for paths in (files, folders))
@@ -69,7 +69,7 @@ def _refuse_same(files: list[Path], folders: list[Path]) -> None:
 
 
 def _check_writable(folder: Path, asked: Path) -> None:
-    """By writing: permissions say nothing of a full disk, or of a mount that refuses."""
+    """Test by writing: permissions do not reveal a full disk or a read-only mount."""
     try:
         if asked.exists() and not os.access(asked, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
@@ -79,36 +79,36 @@ def _check_writable(folder: Path, asked: Path) -> None:
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """All of a regular file; OSError for anything else: a pipe may never end, and a device has no end at all."""
+    """Read a whole regular file. Raises OSError for anything else: a pipe may never end, and a device has no end."""
     path = Path(path)
     mode = path.stat().st_mode
-    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # of a folder the system says so itself
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # for a folder the system raises a clear error itself
         raise OSError(errno.EINVAL, "a pipe or a device, not a regular file; copy it into a file first", str(path))
     return path.read_bytes()
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
-    """All of a regular file as UTF-8 text; raises as read_bytes(), and UnicodeDecodeError."""
+    """Read a whole regular file as UTF-8 text; raises like read_bytes(), and UnicodeDecodeError."""
     return read_bytes(path).decode("utf-8").replace("\r\n", "\n")
 
 
 def named(path: Path) -> Path:
-    """`path` with a name of its own, to put something beside it; "." has none."""
+    """Return `path` in a form that has a name, which "." lacks, so that something can be put beside it."""
     return path if path.name else path.resolve()
 
 
 @contextmanager
 def written(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """`with written(path) as aside:` write to `aside`, a file beside it; after the block it takes the place of `path`.
+    """`with written(path) as aside:` write to `aside`, a file beside `path`; after the block it replaces `path`.
 
-    Whatever happens (an error, a full disk, a power cut), `path` is the old file or the whole new one. An OSError in
+    Whatever happens (an error, a full disk, a power cut), `path` is the old file or the complete new one. An OSError in
     the block becomes a TargetError.
     """
     target = Path(path)
     aside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
     try:
         yield aside
-        with aside.open("r+b") as file:  # Windows syncs only what may be written
+        with aside.open("r+b") as file:  # Windows syncs only files opened for writing
             os.fsync(file.fileno())
         os.replace(aside, target)
     except OSError as error:
@@ -118,15 +118,15 @@ def written(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """`text` as UTF-8 with \\n, whole or not at all; TargetError."""
+    """Write `text` as UTF-8 with \\n, completely or not at all. Raises TargetError if that fails."""
     with written(path) as aside:
         aside.write_text(text, encoding="utf-8", newline="\n")
 
 
 @contextmanager
 def written_into(folder: Path) -> Iterator[Path]:
-    """`with written_into(folder) as aside:` write files into `aside`; after the block they take their places in
-    `folder`, which is made if need be. Nothing is half-written; an OSError in the block becomes a TargetError.
+    """`with written_into(folder) as aside:` write files into `aside`; after the block they are moved into `folder`,
+    which is created if needed. No file is half-written; an OSError in the block becomes a TargetError.
     """
     folder = named(folder)
     aside = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}")
@@ -143,13 +143,13 @@ def written_into(folder: Path) -> Iterator[Path]:
 
 
 class OutputError(BifaError):
-    """What a command prints cannot be written; the text says why."""
+    """The output of a command cannot be written; the text says why."""
 
 
 @contextmanager
 def writable() -> Iterator[None]:
-    """Wraps a whole command: an error of a full disk becomes an OutputError. A robot inside has been stopped by
-    then."""
+    """Wrap a whole command, turning the error of a full disk into an OutputError. A robot used inside has been stopped
+    by then."""
     try:
         yield
         if sys.stdout is not None:
@@ -157,10 +157,10 @@ def writable() -> Iterator[None]:
     except OSError as error:
         if error.errno is None or error.errno not in _FULL:
             raise
-        with suppress(OSError, ValueError):  # what is not written yet would fail once more as Python exits
+        with suppress(OSError, ValueError):  # buffered output would fail again when Python exits
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, sys.stdout.fileno())
             os.close(nowhere)
-        what = error.filename2 or error.filename or "the output"  # of a copy the second is where it goes
+        what = error.filename2 or error.filename or "the output"  # for a copy, the second is the destination
         reason = os.strerror(error.errno)
         raise OutputError(f"{what} cannot be written ({reason}); free some space, or redirect it") from None

@@ -1,7 +1,7 @@
-"""One program at a time in a folder: who writes there holds a lock beside it, which says who that is.
+"""One program at a time in a folder: the writer holds a lock file beside it, which names the writer.
 
-The operating system lets go of a lock when the program that holds it ends, however it ends; so what a killed one has
-left behind is stale by itself, and taken over.
+The operating system releases a lock when the program that holds it ends, however it ends, so a lock file left behind
+by a killed program is stale and taken over.
 """
 
 from __future__ import annotations
@@ -19,16 +19,17 @@ from typing import IO
 
 from bifa.errors import BifaError
 
-_FARTHEST = 1 << 30  # where Windows locks a byte: what is locked cannot be read
+_FARTHEST = 1 << 30  # position of the byte locked on Windows, beyond the text, since locked bytes cannot be read
 
 
 class LockedError(BifaError):
-    """Another program writes there; the text says which."""
+    """Another program is writing there; the text says which."""
 
 
 @contextmanager
 def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
-    """Nobody else is `locked` on `folder` while the block runs; the folder need not exist yet. Raises LockedError."""
+    """Hold the lock on `folder` while the block runs; the folder need not exist yet. Raises LockedError if another
+    program holds it."""
     folder = Path(folder).resolve()
     folder.parent.mkdir(parents=True, exist_ok=True)
     path = folder.with_name(f".{folder.name}.lock")
@@ -39,13 +40,13 @@ def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
         file.flush()
         yield
     finally:
-        with suppress(OSError):  # Windows removes no file that is open; it is stale then
+        with suppress(OSError):  # Windows cannot remove an open file; it stays behind as a stale lock
             path.unlink()
         file.close()
 
 
 def _taken(path: Path, folder: Path) -> IO[str]:
-    """The lock's file, open and held."""
+    """Open the lock file and lock it."""
     while True:
         try:
             file = path.open("a+", encoding="utf-8")
@@ -59,11 +60,11 @@ def _taken(path: Path, folder: Path) -> IO[str]:
         with suppress(OSError):
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 return file
-        file.close()  # whoever held it has just removed it: there is another now, or none
+        file.close()  # the previous holder has just removed this file: try again with the current one
 
 
 def _hold(file: IO[str]) -> bool:
-    """Whether `file` is now held by this program."""
+    """Try to lock `file`; returns whether that succeeded."""
     try:
         _lock(file)
     except OSError:
@@ -85,7 +86,7 @@ def _words(text: str) -> str:
         who = json.loads(text)
         return f"`{who['command']}` (process {who['pid']} on {who['host']}, since {who['since']})"
     except (ValueError, KeyError, TypeError):
-        return "another program"  # which has not come to say who it is
+        return "another program"  # which has not written its identity yet
 
 
 if sys.platform == "win32":

@@ -1,4 +1,4 @@
-"""What a notebook needs: `import bifa`, a data set, a robot that is simulated, diagnosed, optimised, and talked to."""
+"""The interface for notebooks (`import bifa`): load a data set; simulate, diagnose, optimise and connect to a robot."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from bifa.data import Dataset, Trial, read_dataset
 from bifa.errors import BifaError
 from bifa.robot import BASELINE, Gait, Model, load_model, nominal, read_gait_file, save_model
 
-if TYPE_CHECKING:  # imported when first used: a notebook waits only for what it uses
+if TYPE_CHECKING:  # imported on first use, so that a notebook loads only what it needs
     from bifa.gait import Optimum
     from bifa.link import Uno
     from lacuna import Verdict
 
 
 def load_dataset(folder: str | Path) -> Dataset:
-    """The data set in `folder`. Raises DatasetError, with file, line and column."""
+    """Read the data set in `folder`. Raises DatasetError, with file, line and column."""
     return read_dataset(Path(folder))
 
 
 class Robot:
-    """A robot as a model has it: the paper's nominal one, one from a model file, or one completed by a diagnosis."""
+    """A robot described by a model: the paper's nominal one, one from a model file, or one completed by a diagnosis."""
 
     def __init__(self, model: Model | str | Path | None = None):
         self.model = nominal() if model is None else model if isinstance(model, Model) else load_model(Path(model))
@@ -35,7 +35,7 @@ class Robot:
         return f"Robot({self.model.name!r}{effects})"
 
     def simulate(self, gait: Gait | str | Path = BASELINE, cycles: int = 5) -> Trial:
-        """A walk from rest, sampled at 100 Hz, as a trial of a data set would have it."""
+        """Simulate a walk from rest, sampled at 100 Hz; returns it as a trial of a data set."""
         from bifa.simulate import walk
 
         chosen = _gait(gait)
@@ -44,14 +44,14 @@ class Robot:
         return Trial(f"{self.model.name}_simulated.csv", "locomotion", columns, gait=chosen.as_dict())
 
     def speed_mm_s(self, gait: Gait | str | Path = BASELINE, cycles: int = 10) -> float:
-        """Speed of the last cycle."""
+        """Simulate a walk from rest; returns the speed of its last cycle."""
         from bifa.simulate import gait_rows, speeds
 
         return float(speeds(self.model, gait_rows([_gait(gait)]), _at_least_one(cycles), 1e-6).speed_mm_s[0])
 
     def diagnose(self, dataset: Dataset, *, seed: int = 0, matters: Mapping[str, float] | None = None) -> Verdict:
-        """What this robot's base model lacks, by a data set: a `lacuna.Verdict`. `matters`: RMS error by column up to
-        which a prediction is good enough. Minutes of processor for a whole campaign."""
+        """Diagnose from a data set what this robot's base model lacks; returns a `lacuna.Verdict`. `matters`: the RMS
+        error, by column, up to which a prediction is good enough. Takes minutes of processor time for a campaign."""
         import lacuna
         from bifa.identify.start import prepare
         from bifa.problem.accuracy import accuracies
@@ -61,13 +61,14 @@ class Robot:
         return lacuna.diagnose(system, seed=seed)
 
     def completed(self, verdict: Verdict) -> Robot:
-        """The robot with what a verdict found: fitted values, effects, learnt curves."""
+        """Return the robot completed by a verdict: with its fitted values, effects and learnt curves."""
         from bifa.identify.completed import completed_model
 
         return Robot(completed_model(verdict.diagnosis.final))
 
     def optimize(self, *, robust: bool = True, seed: int = 0, evaluations: int | None = None) -> Optimum:
-        """The fastest gait on this robot, or (robust) on nine in ten like it: a `bifa.gait.Optimum`, with `gait`."""
+        """Find the fastest gait on this robot or, if `robust`, on nine in ten robots like it; returns a
+        `bifa.gait.Optimum` with its `gait`."""
         from bifa.gait import Settings, optimize, simulations
 
         settings = Settings(robust=robust, seed=seed, evaluations=evaluations)
@@ -81,8 +82,8 @@ class Robot:
 
 @contextmanager
 def connect(port: str | None = None) -> Iterator[Uno]:
-    """The Uno at `port` (a serial port, `virtual`, or found by itself), connected: a `bifa.link.Uno`. Valves are off
-    at the end."""
+    """Connect to the Uno at `port` (a serial port, `virtual`, or None to find it); yields a `bifa.link.Uno`. The valves
+    are off at the end."""
     from bifa.link import Uno
     from bifa.rig import open_rig
 
@@ -93,7 +94,7 @@ def connect(port: str | None = None) -> Iterator[Uno]:
 
 def _at_least_one(cycles: int) -> int:
     if cycles < 1:
-        raise BifaError(f"a walk has at least one cycle, not {cycles}")
+        raise BifaError(f"a walk needs at least one cycle, not {cycles}")
     return cycles
 
 

@@ -1,10 +1,11 @@
-"""Text for the terminal: control characters from outside are shown instead of obeyed; and counted nouns."""
+"""Text for the terminal: control characters from outside are shown rather than obeyed; also counted nouns."""
 
 
 def printable(text: str, keep: str = "\n\t") -> str:
-    """`text` with every character that is not printable, and is not in `keep`, as its escape: ESC as \\x1b.
+    """Return `text` with characters that are neither printable nor in `keep` replaced by their escapes: ESC by \\x1b.
 
-    So neither an Uno, a file's name, a key nor a header can set a window's title, fill the clipboard or hide a line.
+    This prevents an Uno, a file name, a key or a header from setting the window's title, filling the clipboard or
+    hiding a line.
     """
     if text.isprintable():
         return text
@@ -12,5 +13,5 @@ def printable(text: str, keep: str = "\n\t") -> str:
 
 
 def counted(number: int, one: str) -> str:
-    """`number` with its noun: 1 trial, 2 trials."""
+    """Return `number` with its noun: 1 trial, 2 trials."""
     return f"{number} {one}{'' if number == 1 else 's'}"

@@ -1,4 +1,4 @@
-"""The console that commands print on: text is text, wherever it comes from."""
+"""The console that commands print to. Text is always shown literally, wherever it comes from."""
 
 import math
 from collections.abc import Iterable
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
 
 
 class Console(rich.console.Console):
-    """Rich's, which interprets nothing in the text it is given: no escape sequence, no markup, no emoji code.
-    Colored text is given as a `Text`."""
+    """Rich's console, but plain strings are never interpreted: no escape sequences, markup or emoji codes. Colored text
+    is passed as a `Text`."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"markup": False, "emoji": False, "highlight": False} | options)
 
     def render(self, *args: Any, **kwargs: Any) -> Iterable[Segment]:
-        """See rich.console.Console: text is made printable, rich's own control codes stay."""
+        """See rich.console.Console. Text is made printable; rich's own control codes are kept."""
         for segment in super().render(*args, **kwargs):
             yield segment if segment.control else Segment(printable(segment.text), segment.style)
 
     def status(self, status: Any, **options: Any) -> "Status":
-        """See rich.console.Console, whose status would take markup."""
+        """See rich.console.Console, whose own status would interpret markup."""
         return super().status(Text(status) if isinstance(status, str) else status, **options)
 
 
 class Countdown:
-    """What is being waited for, and for how long still: one line, redrawn in place; printed once where it cannot be.
-    Input that is typed meanwhile may follow it."""
+    """Shows what is being waited for and how long it still takes, in one line that is redrawn in place, or printed once
+    if that is not possible. Input typed meanwhile may follow the line."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -42,7 +42,7 @@ class Countdown:
         self._what = ""
 
     def show(self, what: str, left_s: float) -> None:
-        """`what` goes on for `left_s` more."""
+        """Show that `what` takes `left_s` more."""
         text = f"{what}: {math.ceil(left_s)} s"
         if self._status is not None:
             self._status.update(Text(text))
@@ -54,19 +54,19 @@ class Countdown:
         self._what = what
 
     def close(self) -> None:
-        """The line goes; a second call does nothing."""
+        """Remove the line; a second call does nothing."""
         if self._status is not None:
             self._status.stop()
         self._status, self._what = None, ""
 
 
 def words(template: str, **options: Any) -> "TextColumn":
-    """A column of a progress bar, in which markup is text."""
+    """Return a text column for a progress bar that does not interpret markup."""
     from rich.progress import TextColumn  # most commands show no bar
 
     return TextColumn(template, markup=False, **options)
 
 
 def warning(text: str) -> Text:
-    """A warning, as every command shows one."""
+    """Return a warning in the format used by all commands."""
     return Text.assemble(("warning", "yellow"), " ", text)

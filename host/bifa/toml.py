@@ -4,14 +4,14 @@ import re
 import tomllib
 from typing import Any
 
-MOST_PARTS = 100  # of a dotted key; tomllib's time and memory grow with their square
+MOST_PARTS = 100  # in a dotted key; tomllib's time and memory grow with the square of their number
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w\\-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS},}}+", re.ASCII)
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """The document in `text`, without the mark that some editors begin a file with. Raises tomllib.TOMLDecodeError,
-    whatever is wrong with it."""
+    """Parse the document in `text`, ignoring a leading byte order mark. Raises tomllib.TOMLDecodeError, whatever is
+    wrong with it."""
     text = text.removeprefix("\ufeff")
     if long := _LONG_KEY.search(text):
         line = text.count("\n", 0, long.start()) + 1
@@ -21,6 +21,6 @@ def parse_toml(text: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError:
         raise
     except RecursionError:
-        raise tomllib.TOMLDecodeError("Nested too deep") from None
+        raise tomllib.TOMLDecodeError("Nested too deeply") from None
     except ValueError as error:  # an integer of over 4300 digits
         raise tomllib.TOMLDecodeError(str(error)) from None

@@ -1,2 +1,2 @@
-"""The rig that tests and benchmarks share: the Uno's own code compiled for this computer, its image in the simulated
-chip, a line with faults, a serial port and a terminal for whole programs."""
+"""Code that tests and benchmarks share: the Uno's own code compiled for this computer, its image in the simulated chip,
+a faulty line, and a serial port and a terminal for whole programs."""

@@ -18,7 +18,7 @@ STATES = ("idle", "running", "holding", "stopped", "fault")
 
 
 class Board:
-    """A board without a robot; a transport and a clock in one, with steps of a millisecond."""
+    """A board without a robot; transport and clock in one, in steps of a millisecond."""
 
     def __init__(self) -> None:
         self._board = ffi.gc(lib.board_new(), lib.board_free)

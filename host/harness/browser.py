@@ -1,4 +1,4 @@
-"""A headless Chromium for tests of pages: Debian's, or the one that BIFA_CHROMIUM names."""
+"""A headless Chromium for tests of pages: Debian's, or the one named by BIFA_CHROMIUM."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 
 def find_browser() -> str | None:
-    """Its path, or None."""
+    """Path of the browser, or None."""
     return os.environ.get("BIFA_CHROMIUM") or next((path for name in _NAMES if (path := shutil.which(name))), None)
 
 
 @contextmanager
 def open_browser() -> Iterator:
-    """A browser of playwright's, with a profile of its own that is thrown away."""
+    """A browser driven by playwright, with a temporary profile."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

@@ -1,4 +1,4 @@
-"""The image in the simulated ATmega328P behind the link's transport and clock, in virtual time."""
+"""The firmware image in the simulated ATmega328P, as transport and clock of the link, in virtual time."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,15 +9,15 @@ from bifa.link.table import COMMANDS
 from virtual_robot.uno import CLOCK_HZ, Event, Uno
 
 FIRMWARE = Path(__file__).parents[2] / ".pio/build/uno/firmware.elf"
-AT_REST_V = 2.5  # the sensors' reading of no pressure
-A_BIT_V = 0.005  # by which it moves, as that of a sensor that lives
+AT_REST_V = 2.5  # the sensors' output at zero pressure
+A_BIT_V = 0.005  # by which the output varies, as a working sensor's does
 ALIVE_EVERY_S = 0.01
 CYCLES_A_BYTE = 10 * CLOCK_HZ // 250_000
 VALVES = range(4, 10)
 
 
 class Line:
-    """Transport and clock at once, of an Uno in the simulated chip."""
+    """Transport and clock in one, for an Uno in the simulated chip."""
 
     def __init__(self, uno: Uno) -> None:
         self.uno = uno
@@ -43,7 +43,7 @@ class Line:
 
 
 def connected(uno: Uno) -> link.Uno:
-    """The host's end of its link, connected."""
+    """The host's end of the link to `uno`, connected."""
     line = Line(uno)
     host = link.Uno(line, line, seed=1)
     host.connect()
@@ -51,13 +51,13 @@ def connected(uno: Uno) -> link.Uno:
 
 
 def encoded(host: link.Uno, *names: str) -> list[bytes]:
-    """The frames of commands without fields, numbered as the next ones of its session."""
+    """The frames of commands without fields, numbered as the next ones of the host's session."""
     seed, sequence = frames.session_seed(host.session.key), host.session.sequence
     return [frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(names)]
 
 
 class Chip(Line):
-    """A bare Uno (no robot) whose sensors live; `volts` is what they read."""
+    """A bare Uno (no robot) with working sensors, whose outputs are `volts`."""
 
     def __init__(self, keep_events: bool = False, eeprom: bytes | None = None) -> None:
         super().__init__(Uno(FIRMWARE, keep_events=keep_events))
@@ -88,15 +88,15 @@ class Chip(Line):
         return sum((self.uno.pin(pin) or 0) << i for i, pin in enumerate(VALVES))
 
     def edges(self, first: int, pins: Iterable[int] = VALVES) -> list[Event]:
-        """Events of these pins, since the one of number `first`."""
+        """Events of these pins from event number `first` on."""
         return [event for event in self.uno.iter_events(first) if event.kind == "pin" and event.index in pins]
 
     def fell(self, first: int) -> list[int]:
-        """Cycles at which a valve was taken off since then."""
+        """Cycles at which a valve was switched off, from event number `first` on."""
         return [edge.cycle for edge in self.edges(first) if edge.value == 0]
 
     def stop_latency_s(self, before: bytes, stop: bytes, after: bytes) -> float:
-        """From the last bit of `stop`, sent between `before` and `after` without a pause, to the last valve's fall.
+        """Time from the last bit of `stop`, sent without pause between `before` and `after`, to the last valve's fall.
 
         The line must be idle and at least one valve on.
         """

@@ -1,4 +1,4 @@
-"""Small data sets to read, to break and to write."""
+"""Small data sets for tests to read, corrupt and write."""
 
 from dataclasses import asdict
 
@@ -17,7 +17,7 @@ SETTINGS = {
 
 
 def make_trial(experiment: str = "locomotion", repeat: int = 1, samples: int = 40, seed: int = 0, **changes):
-    """A trial whose columns are noise on a slow movement, its commands 0 and 1."""
+    """A trial whose columns are a slow movement with noise, and whose commands are 0, then 1."""
     rng = np.random.default_rng([seed, repeat])
     layout = EXPERIMENTS[experiment]
     columns = {}
@@ -33,13 +33,13 @@ def make_trial(experiment: str = "locomotion", repeat: int = 1, samples: int = 4
 
 
 def make_dataset(repeats: int = 2) -> Dataset:
-    """Every experiment, repeated."""
+    """A data set with `repeats` trials of every experiment."""
     trials = [make_trial(name, repeat) for name in EXPERIMENTS for repeat in range(1, repeats + 1)]
     return Dataset(None, "made for a test", {"head_mass_kg": 0.175}, tuple(trials), {"made_by": "a test"})
 
 
 def assert_same(left: Dataset, right: Dataset) -> None:
-    """Equal to the last bit, the folder's path aside."""
+    """Assert that two data sets are equal to the last bit, except for their paths and exports."""
     one, other = ({**asdict(data), "path": None, "exports": None} for data in (left, right))
     np.testing.assert_equal(one, other)
     assert [list(trial["columns"]) for trial in one["trials"]] == [list(t["columns"]) for t in other["trials"]]

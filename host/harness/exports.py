@@ -1,4 +1,4 @@
-"""Exports as other people's programs write them, from any numbers: the layouts are theirs, the numbers invented.
+"""Exports in the layouts of other people's programs, from any numbers.
 
 Each writer takes columns under the data set's names and returns the bytes of a file; `EXPORTS` has them by preset.
 """
@@ -15,7 +15,7 @@ Columns = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Program:
-    """`suffix` of its files; `write(columns)`."""
+    """A program: the `suffix` of its files, and `write(columns)`."""
 
     suffix: str
     write: Callable[[Columns], bytes]
@@ -37,7 +37,7 @@ def _rows(*columns: np.ndarray) -> list[list[float]]:
 
 
 def _heads(columns: Columns) -> list[np.ndarray]:
-    """Of a camera: the head or the one actuator, and the tail, in mm."""
+    """Camera columns: the head or the single actuator, and the tail if there is one, in mm."""
     names = ("displacement_mm", "displacement_head_mm", "displacement_tail_mm")
     return [columns[name] for name in names if name in columns]
 
@@ -64,7 +64,7 @@ def motive(columns: Columns) -> bytes:
 
 
 def motive3(columns: Columns) -> bytes:
-    """OptiTrack Motive 3, format 1.25: a row more, with parents."""
+    """OptiTrack Motive 3, format 1.25: labelled header rows, and one more, with parents."""
     text = motive(columns).decode()
     meta, blank, kind, name, code, *rest = text.split("\r\n")
     named = [f",{word}{row[1:]}" for word, row in (("Type", kind), ("Name", name), ("ID", code))]
@@ -72,7 +72,7 @@ def motive3(columns: Columns) -> bytes:
 
 
 def natnet(columns: Columns) -> bytes:
-    """A logger of the NatNet stream: a row a rigid body, two of them; the computer's time."""
+    """A logger of the NatNet stream: one row per rigid body, two bodies; the computer's time."""
     (x_mm, *_), time_s = _heads(columns), columns["time_s"]
     rows: list[list[object]] = [["timestamp", "rigid_body_id", "x", "y", "z", "qx", "qy", "qz", "qw"]]
     for t, x in zip((time_s + 1.7e9).tolist(), (1e-3 * x_mm).tolist(), strict=True):
@@ -95,7 +95,7 @@ def qualisys(columns: Columns) -> bytes:
 
 
 def vicon(columns: Columns) -> bytes:
-    """Vicon Nexus, trajectories: frames instead of times, a name over each three columns, a row of units."""
+    """Vicon Nexus, trajectories: frames instead of times, a name over every three columns, a row of units."""
     heads, time_s = _heads(columns), columns["time_s"]
     names = ["robot:head", "robot:tail"][: len(heads)]
     zero = np.zeros(len(time_s))
@@ -123,7 +123,7 @@ def _machine(
     newton: float = 1.0,
     encoding: str = "cp1252",
 ) -> Callable[[Columns], bytes]:
-    """A testing machine's program: time, travel and force below `above`; a count of its force is `newton`."""
+    """A testing machine's program: time, travel and force below `above`; the unit of force is `newton` N."""
 
     def write(columns: Columns) -> bytes:
         numbers = _rows(columns["time_s"], columns["displacement_mm"], columns["force_N"] / newton)
@@ -133,7 +133,7 @@ def _machine(
 
 
 def labview(columns: Columns) -> bytes:
-    """LabVIEW's measurement file: two headers, an empty column of remarks."""
+    """LabVIEW's measurement file: two headers, an empty column of comments."""
     names = [("Displacement", "displacement_mm"), ("Displacement", "displacement_head_mm"), ("Force", "force_N")]
     names = [(label, columns[name]) for label, name in names if name in columns]
     text = "LabVIEW Measurement\t\r\nWriter_Version\t2\r\nReader_Version\t2\r\nSeparator\tTab\r\n"
@@ -145,7 +145,7 @@ def labview(columns: Columns) -> bytes:
 
 
 def arduino(columns: Columns) -> bytes:
-    """A logger on an Arduino: millis() and what was read."""
+    """A logger on an Arduino: millis() and the readings."""
     names = {"displacement_mm": "position_mm", "displacement_head_mm": "position_mm", "force_N": "force_N"}
     found = {label: columns[name] for name, label in names.items() if name in columns}
     millis = np.round(1000.0 * columns["time_s"], 3)

@@ -1,10 +1,10 @@
-"""A line that flips, drops, doubles and invents bytes, singly and in bursts, in both directions; seeded."""
+"""A serial line that corrupts, drops, doubles and invents bytes, singly and in bursts, both ways; seeded."""
 
 import random
 
 
 class FaultyLine:
-    """Wraps a transport. `rate` is the probability that something happens to a byte."""
+    """Wraps a transport. `rate` is the probability that a byte is hit."""
 
     def __init__(self, transport, rate: float, seed: int) -> None:
         self._transport = transport

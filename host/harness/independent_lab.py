@@ -1,8 +1,8 @@
-"""A laboratory of its own for the tests: another stiffness curve, another integrator, coloured noise.
+"""An independent laboratory for the tests: another stiffness curve, another integrator, coloured noise.
 
 Written from the paper's equations (1)-(8), not from the model's code: the curve is a von Mises truss with stiffening
 ends instead of a sine-like polynomial, forces are stepped explicitly at 20 us with friction as an impulse bound, the
-steps of a single actuator come from SciPy, and every channel carries noise of an autoregressive process.
+steps of a single actuator are integrated by SciPy, and every channel carries autoregressive noise.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class IndependentLab:
         return sd * out[50:]
 
     def sensor(self, pressure: np.ndarray) -> np.ndarray:
-        """Through noise and a converter of 0.0366 psi a count."""
+        """Readings after noise and a converter with 0.0366 psi per count."""
         noisy = pressure + self.noise(len(pressure), self.pressure_noise)
         return np.round(noisy / (30 / 819)) * (30 / 819)
 
@@ -109,7 +109,7 @@ class IndependentLab:
         )
 
     def step(self, which: str, pressure: float, **labels) -> Trial:
-        """At rest under vacuum, positive from 0.5 s, vacuum again from 3.5 s, to 8 s."""
+        """A step response: vacuum until settled, positive supply from 0.5 s, vacuum again from 3.5 to 8 s."""
         time, x, sensed = _clean_step(getattr(self, which), self.negative, pressure)
         columns = {
             "time_s": time,
@@ -120,7 +120,7 @@ class IndependentLab:
         return Trial("", "step_response", columns, which, pressure, **labels)
 
     def anchor(self, pressure: float, rate_mm_s: float = 20.0, **labels) -> Trial:
-        """Quasi-static: the load cell winds up to static friction, then the head slides."""
+        """A quasi-static pull: the load cell's force rises to static friction, then the head slides."""
         actuator = self.small
 
         def balance(x):
@@ -144,7 +144,7 @@ class IndependentLab:
         return Trial("", "anchor_pull", columns, pressure_psi=pressure, rate_mm_s=rate_mm_s, **labels)
 
     def walk(self, gait: dict[str, float], duration_s: float = 20.0, **labels) -> Trial:
-        """All three phases start where eq. (9) settles, the body's at 0."""
+        """A walk; the phases start where eq. (9) settles, the body's at 0."""
         time = np.arange(0.0, duration_s, 0.01)
         phases = np.array([0.0, gait["psi12_deg"], gait["psi13_deg"]]) / 360.0
         duties = np.array([gait["duty_body"], gait["duty_head"], gait["duty_tail"]])
@@ -173,7 +173,7 @@ class IndependentLab:
         return Trial("", "locomotion", columns, gait=gait, **labels)
 
     def day(self, name: str, trials: Sequence[Trial], path: Path | None = None) -> Dataset:
-        """A data set of trials in the order in which they were measured."""
+        """A data set of `trials`, in the order in which they were measured."""
         known = {"head_mass_kg": self.head_mass, "tail_mass_kg": self.tail_mass}
         known |= {"supply_positive_psi": self.positive, "supply_negative_psi": self.negative}
         trials = tuple(replace(t, file=f"{i:03d}_{t.experiment}.csv", session_order=i) for i, t in enumerate(trials))
@@ -196,7 +196,7 @@ def session(lab: IndependentLab, path: Path | None, repeats: int = 3, walks: int
 
 
 def small_session(lab: IndependentLab) -> Dataset:
-    """Enough to determine everything, twice each, and short: the suite has to end."""
+    """A short session, for fast tests: two repeats of the experiments needed to determine every parameter."""
     trials = []
     for repeat in (1, 2):
         for which in ("large", "small"):
@@ -209,7 +209,7 @@ def small_session(lab: IndependentLab) -> Dataset:
 
 @lru_cache(maxsize=64)
 def _clean_step(actuator: Actuator, negative: float, pressure: float):
-    """Time [s], displacement [m] and pressure [psi] without noise."""
+    """Time [s], displacement [m] and pressure [psi] of a step response without noise."""
     threshold = actuator.unstable
     rest = brentq(lambda x: actuator.spring(x) - actuator.area * negative, -0.02, 1e-3)
 
@@ -252,7 +252,7 @@ def _clean_step(actuator: Actuator, negative: float, pressure: float):
 
 @njit(cache=True)
 def _friction(velocity, force, mass, normal, mu_s, mu_k):
-    """The velocity after a step with an impulse of friction of at most mu N h against it."""
+    """Velocity after a step in which friction opposes the motion with an impulse of at most mu N h."""
     free = velocity + STEP_S * force / mass
     most = STEP_S * (mu_s if velocity == 0.0 else mu_k) * normal / mass
     if abs(free) <= most:

@@ -1,7 +1,7 @@
-"""A lab beside the virtual robot: somebody who does what `next.toml` asks, with a camera and a testing machine.
+"""A simulated operator of the virtual robot's lab, who does what `next.toml` asks, with a camera and a testing machine.
 
-As a program (`python -m harness.lab LINK FOLDER [BENCH]`) it serves the robot on a pty as well; with BENCH, a bench's
-file, its instruments write in turn as the named programs do, and it declares which in that file.
+As a program (`python -m harness.lab LINK FOLDER [BENCH]`) it also serves the robot on a pty. With BENCH, a bench file,
+its instruments export their records in the formats of the known programs in turn, and it declares each in that file.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ STATIC = PlannedTrial("static_loading", "small", 4.0, 20.0)
 STEP = PlannedTrial("step_response", "small", 8.5)
 PULL = PlannedTrial("anchor_pull", None, 8.5, 40.0)
 WALK = PlannedTrial("locomotion", gait=BRISK, cycles=1)
-PLAN = (STATIC, STEP, PULL, WALK)  # every experiment, each as short as it may be
+PLAN = (STATIC, STEP, PULL, WALK)  # every experiment, each as short as is allowed
 
-_MOUNTED_BY = {  # which of a trial's settings the stand is told
+_MOUNTED_BY = {  # the settings of a trial that the stand needs
     "static_loading": ("actuator", "rate_mm_s"),
     "step_response": ("actuator",),
     "anchor_pull": ("rate_mm_s",),
@@ -37,8 +37,8 @@ _LOOK_S = 0.05
 
 
 class Lab:
-    """Answers each question once, by the method of its step's name. `spoil(asked, record)` may change what is saved, to
-    see it refused."""
+    """Answers each request once, by the method named after its step. `spoil(asked, record)` may alter what is saved, to
+    test that it is refused."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class Lab:
         self.review: Callable[[dict], str] = lambda asked: ""
 
     def look(self) -> None:
-        """Do what is asked, if it has not been done yet."""
+        """Do what is requested, if it has not been done yet."""
         path = self._folder / "next.toml"
         try:
             stamp, asked = (path.stat().st_ino, path.stat().st_mtime_ns), tomllib.loads(path.read_text())
@@ -66,7 +66,7 @@ class Lab:
         with self._rig.world.turn:
             answer = getattr(self, asked["step"])(asked)
         if answer is None:
-            return  # under way
+            return  # not finished
         self._done = stamp
         self.asked.append(asked)
         aside = self._folder / ".answer"
@@ -106,7 +106,7 @@ class Lab:
         return ""
 
     def _export(self, asked: dict, record: dict, name: str) -> str:
-        """As the next of the programs writes it; its clock begins with its first sample, as that of frames does."""
+        """Export as the next program does; its clock starts at its first sample, as frame numbers do."""
         role = "machine" if asked["experiment"] in ("static_loading", "anchor_pull") else "camera"
         program = next(self._turns[role])
         begin_s = record["time_s"][0]
@@ -114,7 +114,7 @@ class Lab:
         record = {**record, "time_s": record["time_s"] - begin_s}
         known = self._bench.read_text() if self._bench.exists() else ""
         declared = f'[instrument.{role}]\npreset = "{preset_of(program)}"\n'
-        if preset_of(program) == "natnet":  # by the computer's time
+        if preset_of(program) == "natnet":  # stamped with the computer's time
             edges = edges + 1.7e9
         self._bench.write_text(known.split("[instrument")[0] + declared)
         (self._folder / program).mkdir(exist_ok=True)
@@ -125,7 +125,7 @@ class Lab:
 
 
 def main() -> None:
-    """Serve until the process is ended."""
+    """Serve until the process is terminated."""
     link, folder = Path(sys.argv[1]), Path(sys.argv[2])
     with open_rig() as rig:
         lab = Lab(rig, folder, bench=Path(sys.argv[3]) if len(sys.argv) > 3 else None)

@@ -1,4 +1,4 @@
-"""Compiles the Uno's own code (lib/) for this computer, so that proofs run millions of times."""
+"""Compile the Uno's own code (lib/) for this computer, so that tests can run it millions of times."""
 
 import hashlib
 import os
@@ -13,9 +13,9 @@ BUILD = ROOT / "build/native"
 
 
 def compiled(name: str, command: Sequence[str], sources: Sequence[Path], included: Sequence[Path] = ()) -> Path:
-    """What the compiler makes of the sources with the headers of lib/; made once for each state of all of them.
+    """Compile the sources with the headers of lib/; cached by the contents of all of them. Return the path.
 
-    Raises RuntimeError with what the compiler said.
+    Raises RuntimeError with the compiler's messages.
     """
     headers = sorted((ROOT / "lib").glob("*/*.h"))
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in [*sources, *included, *headers])).hexdigest()[:16]
@@ -32,7 +32,7 @@ def compiled(name: str, command: Sequence[str], sources: Sequence[Path], include
 
 
 def load(harness: Path, declarations: str, parts: tuple[str, ...] = ("*/*.cpp",)) -> tuple[cffi.FFI, object]:
-    """The harness (a C++ file with C functions) linked with parts of lib/, as a cffi library."""
+    """Load the harness (a C++ file with C functions), linked with parts of lib/, as a cffi library."""
     sources = [harness, *sorted(path for part in parts for path in (ROOT / "lib").glob(part))]
     ffi = cffi.FFI()
     ffi.cdef(declarations)

@@ -1,4 +1,4 @@
-"""The notebooks of docs/: run as they stand, and kept with their outputs (`make notebooks`)."""
+"""The notebooks of docs/: run them, and store them with their outputs (`make notebooks`)."""
 
 import os
 import re
@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = ROOT / "docs" / "notebooks"
 EMPS = ROOT.parent / "shared" / "data" / "emps"
 NAMES = ("your-own-system", "robot", "emps")
-LONGEST_S = 900  # a cell, on a machine that others load as well
+LONGEST_S = 900  # for one cell, on a busy machine
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
@@ -25,8 +25,9 @@ def read(name: str) -> nbformat.NotebookNode:
 
 
 def run(name: str, folder: Path, emps: Path = EMPS) -> nbformat.NotebookNode:
-    """The notebook with fresh outputs, run in `folder`; `emps`: where the benchmark's records are. What is said on
-    stderr (progress) and when is not kept. Raises CellExecutionError, whose notebook is in its attribute `notebook`."""
+    """Run the notebook in `folder` and return it with fresh outputs; `emps`: folder of the benchmark's records. Times
+    and output on stderr (progress) are dropped. Raises CellExecutionError, whose attribute `notebook` has the outputs
+    so far."""
     notebook = read(name)
     with _environment(folder, emps):
         try:
@@ -46,7 +47,7 @@ def run(name: str, folder: Path, emps: Path = EMPS) -> nbformat.NotebookNode:
 
 
 def shape(notebook: nbformat.NotebookNode) -> list[tuple[str, list[str]]]:
-    """What stays as it is on another machine: sources, and kinds of outputs with the first words of each."""
+    """What does not depend on the machine: sources, and the kind and first line of each output."""
     return [(cell.source, [_kind(output) for output in cell.get("outputs", [])]) for cell in notebook.cells]
 
 
@@ -65,10 +66,10 @@ def _environment(folder: Path, emps: Path):
 
 
 def main() -> None:
-    """Run the notebooks named, or all, and write them with their outputs."""
+    """Run the named notebooks, or all of them, and write them with their outputs."""
     for name in sys.argv[1:] or NAMES:
         if name == "emps" and not EMPS.exists():
-            print(f"{name}: left as it is, since its records are not in {EMPS}")
+            print(f"{name}: not run: its records are not in {EMPS}")
             continue
         with tempfile.TemporaryDirectory() as folder:
             nbformat.write(run(name, Path(folder)), NOTEBOOKS / f"{name}.ipynb")

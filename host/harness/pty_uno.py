@@ -13,16 +13,16 @@ STEP_S = 0.002
 
 
 class PtyUno:
-    """The Uno's code behind a pty, in real time as far as it matters."""
+    """The Uno's code behind a pty, in approximately real time."""
 
     def __init__(self) -> None:
         self.master, slave = pty.openpty()
-        tty.setraw(slave)  # a serial port sends nothing back by itself
+        tty.setraw(slave)  # a serial port does not echo
         self.device = os.ttyname(slave)
         self._slave = slave
         self.board = Board()
-        self.heard_s = 0.0  # when the last byte came
-        self.driven_s = 0.0  # when a valve was last on
+        self.heard_s = 0.0  # when the last byte arrived
+        self.driven_s = 0.0  # when a valve was last energized
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
@@ -44,10 +44,10 @@ class PtyUno:
             self._ended.wait(STEP_S)
 
     def on_heard(self, data: bytes) -> None:
-        """Called with what comes, as it comes."""
+        """Called with the bytes received, as they arrive."""
 
     def wait(self, duration_s: float) -> None:
-        """Until so much of the board's own time has passed."""
+        """Wait until this much of the board's own time has passed."""
         end_s = self.board.now() + duration_s
         while self.board.now() < end_s:
             time.sleep(0.01)

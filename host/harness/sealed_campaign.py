@@ -4,7 +4,7 @@
 
 A robot is drawn as `python -m virtual_robot.sealed` draws it, and the campaign's own session measures it: the
 firmware image in the simulated chip, the link, instruments with clocks of their own, profile `realistic`. Writes the
-data set and, beside it, OUT.sealed.toml with what is in it. An interrupted session goes on where it was.
+data set and, beside it, its truth in OUT.sealed.toml. An interrupted session resumes.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ def generate(
     trials: Sequence[plan.PlannedTrial] | None = None,
     profile: str = "realistic",
 ) -> None:
-    """Measure a sealed robot into the data set `out`; then its seal appears (default: OUT.sealed.toml).
+    """Measure a sealed robot into the data set `out`, then write its seal (default: OUT.sealed.toml).
 
-    `effect` and `size` (a factor of its modest size) fix what would be drawn; `trials` replaces the campaign's session.
-    Raises VirtualRobotError or BifaError.
+    `effect` and `size` (a factor of its modest size) replace what would be drawn; `trials` replaces the campaign's
+    session. Raises VirtualRobotError or BifaError.
     """
     forced: dict[str, dict[str, float]] = {}
     if effect is not None:
@@ -89,9 +89,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--out", type=Path, required=True, help="folder of the data set, new or interrupted")
     parser.add_argument("--kind", choices=KINDS, default="one")
-    parser.add_argument("--effect", help="instead of a drawn one; an unknown name lists them")
-    parser.add_argument("--size", type=float, help="factor of its modest size, instead of a drawn one")
-    parser.add_argument("--label", type=Path, help="the sealed file (default: OUT.sealed.toml)")
+    parser.add_argument("--effect", help="effect, instead of a drawn one; an unknown name lists all")
+    parser.add_argument("--size", type=float, help="factor of the effect's modest size, instead of a drawn one")
+    parser.add_argument("--label", type=Path, help="file for the truth (default: OUT.sealed.toml)")
     parser.add_argument("--profile", choices=("ideal", "realistic", "worn"), default="realistic")
     parser.add_argument("--quick", action="store_true", help="fewer conditions, each twice")
     options = vars(parser.parse_args(arguments))

@@ -1,4 +1,4 @@
-"""Documents as people spoil them: a value anywhere that is another, gone, or new."""
+"""Documents as people corrupt them: one value, anywhere, is changed, removed or added."""
 
 import copy
 from typing import Any
@@ -11,7 +11,7 @@ JUNK += [[], [[]], [{}], [1, [2]], ["a", "b"], {}, {"a": 1}, {"a": {"b": 1}}]
 
 @st.composite
 def tampered(draw: st.DrawFn, document: dict[str, Any]) -> dict[str, Any]:
-    """A copy of `document`, of dicts and lists, in which one thing is changed."""
+    """A copy of `document` (dicts and lists) with a single change."""
     spoilt = copy.deepcopy(document)
     place = draw(st.sampled_from(_places(spoilt)))
     how = draw(st.sampled_from(("other", "other", "gone", "new")))
@@ -29,7 +29,7 @@ def tampered(draw: st.DrawFn, document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _places(node: Any, way: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Of every value within, the keys that lead to it; of a list only the first and the last."""
+    """The path of keys to every value within; of a list, only the first and last elements."""
     if isinstance(node, dict):
         keys: list[Any] = list(node)
     else:

@@ -10,7 +10,7 @@ Value = TypeVar("Value")
 
 
 def until(condition: Callable[[], Value], within_s: float = PATIENCE_S) -> Value:
-    """What `condition()` gives once that is neither None nor False, or at the end of the time."""
+    """Poll `condition()` until it is neither None nor False, or time is up; return its last value."""
     deadline = time.monotonic() + within_s
     while (value := condition()) is None or value is False:
         if time.monotonic() > deadline:

@@ -1,4 +1,4 @@
-"""`bifa monitor --web` as a program of its own."""
+"""`bifa monitor --web` in a process of its own."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from harness.web_socket import WebSocket
 
 
 class WebMonitor:
-    """The command, the Uno that it talks to, and its page's address."""
+    """The command, the Uno that it is connected to, and its page's address."""
 
     def __init__(self, *options, port=None, uno=None):
         self.uno = uno or (PtyUno() if port is None else None)
@@ -29,7 +29,7 @@ class WebMonitor:
         self.port = int(self.origin.rpartition(":")[2])
 
     def gait(self):
-        """What the Uno has."""
+        """The parameters that the Uno has."""
         watcher = WebSocket(self.port)
         try:
             return watcher.until(lambda state: "parameters" in state)["parameters"]
@@ -37,11 +37,11 @@ class WebMonitor:
             watcher.close()
 
     def until(self, state, timeout_s=10.0):
-        """Whether the board comes to this state in time."""
+        """Whether the board reaches this state in time."""
         return until(lambda: self.uno.board.state == state, timeout_s)
 
     def interrupt(self):
-        """Ctrl-C; the exit status."""
+        """Press Ctrl-C; return the exit status."""
         self.process.send_signal(signal.SIGINT)
         return self.process.wait(15)
 

@@ -1,4 +1,4 @@
-"""A page of `bifa monitor --web` without a browser: what it says and hears over its websocket."""
+"""A page of `bifa monitor --web` without a browser: what it sends and receives over its websocket."""
 
 import json
 import socket
@@ -11,7 +11,7 @@ from wsproto.events import AcceptConnection, CloseConnection, Message, Ping, Rej
 
 
 class WebSocket:
-    """Connected to 127.0.0.1:`port`; `token` as the page offers it."""
+    """A websocket connected to 127.0.0.1:`port`; `token` is offered as the page offers it."""
 
     def __init__(self, port: int, token: str | None = None, host: str = "127.0.0.1", **headers: str) -> None:
         self._socket = socket.create_connection(("127.0.0.1", port), timeout=20)
@@ -31,13 +31,13 @@ class WebSocket:
         self._socket.sendall(self._wire.send(event))
 
     def ask(self, do: str, **more) -> int:
-        """Ask for something; the number of the request."""
+        """Send a request; return its number."""
         self._number += 1
         self.send(TextMessage(json.dumps({"id": self._number, "do": do, **more})))
         return self._number
 
     def messages(self, timeout_s: float = 20.0) -> Iterator[dict]:
-        """What comes, until the connection is closed (`closed` then says how) or nothing has come for `timeout_s`."""
+        """Messages received, until the connection is closed (see `closed`) or `timeout_s` has passed."""
         until_s = time.monotonic() + timeout_s
         while True:
             while self._come:
@@ -69,7 +69,7 @@ class WebSocket:
                 self._is_accepted = True
 
     def state(self, timeout_s: float = 20.0) -> dict:
-        """The next state that comes, with `you` where the message had it."""
+        """The next state received, with the message's `you`, or None."""
         message = next(message for message in self.messages(timeout_s) if "state" in message)
         return message["state"] | {"you": message.get("you")}
 

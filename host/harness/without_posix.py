@@ -1,7 +1,7 @@
-"""What this project's own code would find on Windows: the modules, functions and signals of POSIX are missing, the
-platform is "win32", and what is open for reading only cannot be synced. Other people's packages see this computer.
+"""Make this project's own code run as if on Windows: the modules, functions and signals of POSIX are missing, the
+platform is "win32", and files opened for reading only cannot be synced. Other packages see this computer.
 
-A plugin of pytest (`-p harness.without_posix`), and `python -m harness.without_posix` is the command `bifa` there.
+A plugin of pytest (`-p harness.without_posix`); `python -m harness.without_posix` runs `bifa` this way.
 """
 
 import builtins
@@ -23,7 +23,7 @@ _OF_OS = (
 
 
 class _Seen(ModuleType):
-    """A module of this computer but for `other` attributes, and without those in `hidden`."""
+    """A module of this computer with `other` attributes overridden and those in `hidden` missing."""
 
     def __init__(self, real: ModuleType, hidden: set[str], **other: Any) -> None:
         super().__init__(real.__name__)

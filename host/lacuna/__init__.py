@@ -1,4 +1,4 @@
-"""lacuna: find what a model lacks. It names the mechanism that is missing, or says that none is, or that none fits.
+"""lacuna: find what a model lacks. It names the missing mechanism, or reports that none is missing or that none fits.
 
 system = lacuna.System(simulate, parameters=[...], effects=[...])
 verdict = lacuna.diagnose(system, records)
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from lacuna.version import __version__
 
-_WHERE = {  # imported when first asked for: who wants one class need not wait for SciPy
+_WHERE = {  # imported on first use, so that importing one class does not import SciPy
     "System": ("lacuna.function_system", "FunctionSystem"),
     "Parameter": ("lacuna.system", "Parameter"),
     "Effect": ("lacuna.system", "Effect"),
@@ -26,7 +26,7 @@ _WHERE = {  # imported when first asked for: who wants one class need not wait f
 }
 __all__ = ["__version__", *_WHERE]
 
-if TYPE_CHECKING:  # the same, for those who read types
+if TYPE_CHECKING:  # the same, for type checkers
     from lacuna.diagnosis.policy import Policy as Policy
     from lacuna.errors import LacunaError as LacunaError
     from lacuna.function_system import FunctionSystem

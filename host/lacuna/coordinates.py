@@ -1,9 +1,9 @@
-"""In which coordinate a parameter is fitted, so that answers do not depend on how a person wrote an effect down.
+"""Coordinates in which parameters are fitted, so that results do not depend on how the user parametrized an effect.
 
-A limit (absent at infinity) and its inverse (absent at 0) are the same effect, a time constant and a rate the same
-shape. Each is fitted in one coordinate: sizes in the one in which they are absent at or near 0, what can only be
-positive by its logarithm, which is the same but for its sign whichever way round it is written. What is told to a
-person is in the person's own parameters.
+A limit (absent at infinity) and its inverse (absent at 0) describe the same effect, and so do a time constant and a
+rate. Each is therefore fitted in one coordinate: sizes in the one in which the effect is absent at or near 0, and
+parameters that can only be positive by their logarithm, which merely changes sign if the inverse is declared. Results
+are reported in the user's own parameters.
 """
 
 from __future__ import annotations
@@ -15,25 +15,26 @@ from dataclasses import dataclass, replace
 from lacuna.errors import DeclarationError
 from lacuna.system import START_FACTORS, Effect, Parameter
 
-LIMITS = (0.4, 0.7, 0.9, 1.0, 1.2)  # of the inverse of a declared limit: fits begin there, and on both sides of it
-_FAR = 3.0  # times the typical size: where an effect is absent so far out, it is a limit
+LIMITS = (0.4, 0.7, 0.9, 1.0, 1.2)  # start factors for the inverse of a declared limit, on both sides of it
+_FAR = 3.0  # times the typical size: an effect that is absent at least this far out is a limit
 
 
 @dataclass(frozen=True)
 class Coordinate:
-    """`fitted(told(u))` is u. `slope(x)` is |du/dx|, for what is known as a width. Units stay as told."""
+    """A pair of inverse maps between the user's parameter x and the fitted one u: u = `fitted(x)`, x = `told(u)`.
+    `slope(x)` is |du/dx|, which converts widths. Units stay those of x."""
 
     fitted: Callable[[float], float]
     told: Callable[[float], float]
     slope: Callable[[float], float]
 
     def interval(self, lower: float, upper: float) -> tuple[float, float]:
-        """In the person's parameter, the smaller end first."""
+        """Convert an interval to the user's parameter, the lower end first."""
         ends = sorted((self.told(lower), self.told(upper)))
         return ends[0], ends[1]
 
     def of(self, p: Parameter) -> Parameter:
-        """`p` as it is fitted."""
+        """Return `p` in the fitted coordinate."""
         lower, upper = sorted(self._end(bound, p.value) for bound in (p.lower, p.upper))
         slope = self.slope(p.value)
         return replace(
@@ -49,18 +50,20 @@ class Coordinate:
         )
 
     def _plausible(self, p: Parameter, told: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
-        """An end that is infinite here (the logarithm of 0) is where the bound is. Raises DeclarationError."""
+        """Convert a plausible range; an end that becomes infinite (the logarithm of 0) is replaced by the bound. Raises
+        DeclarationError if no finite range is left."""
         ends = sorted(self._end(end, p.value) for end in told)
         low, high = (end if math.isfinite(end) else bound for end, bound in zip(ends, bounds, strict=True))
         if not -math.inf < low < high < math.inf:
             raise DeclarationError(
-                f"{p.name}: plausible is {told[0]} to {told[1]}, of which its bounds leave no finite range where it is"
-                " fitted: move the end that is at 0 or beyond"
+                f"{p.name}: plausible is {told[0]} to {told[1]}, of which its bounds leave no finite range in the"
+                " fitted coordinate: move the end that is at 0 or beyond"
             )
         return low, high
 
     def _end(self, bound: float, value: float) -> float:
-        """The inverse of 0, and of what is beyond, is infinite, on the value's side."""
+        """Convert an end of a range. The inverse of 0, or of a bound on the other side of it, is infinite, with the
+        sign of the value."""
         return self.fitted(math.copysign(0.0, value) if self is INVERSE and bound * value <= 0 else bound)
 
 
@@ -94,23 +97,24 @@ LOG = Coordinate(_log, _exp, _inverse)
 
 
 def of_parameter(p: Parameter, ordered: bool = False) -> Coordinate:
-    """Of the base model's parameters and those that shape an effect. `ordered`: it is bound to another one."""
+    """Coordinate of a parameter of the base model or one that shapes an effect. `ordered`: another parameter limits it
+    or is limited by it."""
     return LOG if p.lower > 0.0 and not ordered else PLAIN
 
 
 def of_size(p: Parameter, absent: float) -> Coordinate:
-    """Of a parameter that sizes an effect."""
+    """Coordinate of a parameter that sets the size of an effect."""
     far = abs(absent) >= _FAR * abs(p.value) and absent * p.value > 0.0
     return INVERSE if far and (p.lower >= 0.0 or p.upper <= 0.0) else PLAIN
 
 
 def of_effect(effect: Effect) -> tuple[Effect, dict[str, Coordinate]]:
-    """`effect` as it is fitted, and the coordinate of each of its parameters by its full name."""
+    """Return `effect` in fitted coordinates, and the coordinate of each of its parameters by full name."""
     sizing, shaping = effect.parameters[: effect.sizes], effect.parameters[effect.sizes :]
     chosen = {p.name: of_size(p, effect.absent) for p in sizing} | {p.name: of_parameter(p) for p in shaping}
     if effect.frequency is not None:
-        chosen[effect.frequency] = PLAIN  # fits begin at the peaks of a spectrum
-    if len({chosen[p.name] for p in sizing}) > 1:  # they are absent together
+        chosen[effect.frequency] = PLAIN  # fits start at the peaks of a spectrum
+    if len({chosen[p.name] for p in sizing}) > 1:  # sizes share one absent value
         chosen |= {p.name: PLAIN for p in sizing}
     parameters = tuple(chosen[p.name].of(p) for p in effect.parameters)
     coordinates = {effect.full_name(p): chosen[p.name] for p in effect.parameters}

@@ -1,29 +1,29 @@
-"""Errors that the engine expects: their text says what is wrong and what to do."""
+"""Errors meant for the user: the message says what is wrong and what to do."""
 
 from collections.abc import Iterable
 from typing import Any
 
 
 class LacunaError(Exception):
-    """An error meant for the user: one sentence, to be shown without a traceback."""
+    """An error meant for the user: a sentence to be shown without a traceback."""
 
     for_the_user = True
 
 
 class MisuseError(LacunaError):
-    """The system or its records are not what a diagnosis needs; the text says where and what to do."""
+    """The system, its records or an argument is unsuitable for a diagnosis; the message says where and what to do."""
 
 
 class TooLittleDataError(MisuseError):
-    """There is nothing to fit, or nothing to judge a fit by."""
+    """There are too few data to fit, or to judge a fit."""
 
 
 class DeclarationError(LacunaError, ValueError):
-    """The declaration of a system contradicts itself; the text says where."""
+    """The declaration of a system is invalid; the message says where."""
 
 
 def listed(names: Iterable[Any], most: int = 4) -> str:
-    """The first few, and how many more there are."""
+    """Join the first `most` names, and say how many more there are."""
     every = [str(name) for name in names]
     more = f" and {len(every) - most} more" if len(every) > most else ""
     return ", ".join(every[:most]) + more

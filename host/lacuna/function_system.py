@@ -39,7 +39,7 @@ Simulate = Callable[[Record, Values], Any]
 
 
 class Curve:
-    """The curve learnt at a site, as a function of its variable: 0 everywhere until something has been learnt."""
+    """The curve learnt at a site, as a function of its variable: 0 everywhere until it has been learnt."""
 
     def __init__(self, site: CorrectionSite, table: np.ndarray | None = None):
         self._at = np.linspace(site.lower, site.upper, 2 if table is None else table.shape[1])
@@ -50,35 +50,39 @@ class Curve:
 
 
 class FunctionSystem(System):
-    """A model as a function, with candidate effects that it may lack.
+    """A model given as a function, with the candidate effects that it may lack.
 
-    `simulate(record, theta)` is a free run of one record: from its initial state and its inputs, never from measured
-    outputs. `record["force_N"]` is a column, shape (n,), or a single value of the record, `record.time_s` its times.
-    `theta.mass_kg` is a parameter, `theta.coulomb.force_N` one of an effect, which has its absent value while
-    the effect is off; `theta` holds them in the order in which they are declared here. `simulate` returns the predicted
-    outputs by name, shape (n,) each; a single output may be a bare array. It is called from several threads.
+    `simulate(record, theta)` simulates one record as a free run: from its initial state and its inputs, never from
+    measured outputs. `record["force_N"]` is a column, shape (n,), or a single value of the record; `record.time_s` are
+    its times. `theta.mass_kg` is a parameter of the base model, `theta.coulomb.force_N` one of an effect; while the
+    effect is off, its size has the value at which it is absent. `theta` holds the parameters in the order in which they
+    are declared here. `simulate` returns the predicted outputs by name, each of shape (n,); a single output may be a
+    bare array. It is called from several threads.
 
-    `parameters`: `Parameter`s of the base model. `effects`: `Effect`s that it may lack. One alone of these, of
-    nuisances, curves or experiments needs no brackets. The rest is optional:
+    `parameters`: the `Parameter`s of the base model. `effects`: the `Effect`s that it may lack. A single parameter,
+    effect, nuisance, curve or experiment needs no brackets. All other arguments are optional:
 
     - `outputs`: names of the columns that `simulate` predicts; all others are its inputs. Needed if it returns bare
-      arrays and records have more than one column besides time.
-    - `nuisances`: what differs from run to run, as `Parameter`s or as a function of the record that returns them; in
-      `theta` under their own names. An initial state that is not exactly known is one.
-    - `regressors`: what a residual may depend on: a function of (record, prediction) that returns arrays by name.
-      By default the outputs, their rates and directions, and the inputs.
-    - `sensor_noise`, `accuracy`: by output, in its unit: the instrument's standard deviation; the RMS error up to which
-      a prediction is good enough whatever the noise.
-    - `noise_time_s`: for records without repeats, the correlation time of the noise, by output or for all; or
-      "estimated", from the residual of a first diagnosis. By default only the fast noise of a record counts as noise.
-    - `curves`: `CorrectionSite`s at which a curve may be learnt if no effect explains the records; `theta.NAME(x)`.
+      arrays and records have more than one column apart from time.
+    - `nuisances`: quantities that differ from run to run, such as an initial state that is not exactly known:
+      `Parameter`s, or a function of the record that returns them. `theta` has them under their own names.
+    - `regressors`: quantities that a residual may depend on: a function of (record, prediction) that returns arrays by
+      name. By default the outputs, their rates and directions of change, the inputs, and time.
+    - `sensor_noise`: standard deviation of the instrument's noise, by output, in its unit.
+    - `accuracy`: RMS error up to which a prediction is good enough whatever the noise, by output, in its unit.
+    - `noise_time_s`: for records without repeats, the correlation time of the noise in seconds, by output or for all;
+      "estimated" takes it from the residual of a first diagnosis. By default only the fast noise of a record counts as
+      noise.
+    - `curves`: `CorrectionSite`s at which a curve may be learnt if no effect explains the records; `simulate` evaluates
+      it as `theta.NAME(x)`.
     - `experiments`: `CandidateExperiment`s that could be run next.
-    - `spare`: conditions that are never fitted, so that they judge; () for none. By default, of three or more repeated
-      conditions the one in the middle.
-    - `fixed`: values of parameters that are known and not fitted. `tied`: parameters that always equal another one,
-      which it names. Of the base model, or what shapes an effect (`coulomb.speed_m_s`), not what sizes it.
+    - `spare`: conditions that are never fitted, so that they can judge; () for none. By default the middle condition of
+      every experiment with three or more repeated ones.
+    - `fixed`: values, by name, of parameters that are known and not fitted. `tied`: for a parameter that always equals
+      another one, the name of that one. Both apply to parameters of the base model and to those that shape an effect
+      (`coulomb.speed_m_s`), not to those that set its size.
 
-    Raises DeclarationError if names conflict.
+    Raises DeclarationError if the declaration contradicts itself.
     """
 
     nuisances_per_run = True
@@ -111,11 +115,11 @@ class FunctionSystem(System):
         given, library, sites = several(parameters, Parameter), _library(effects), several(curves, CorrectionSite)
         _check_names([p.name for p in given], "parameter")
         _check_names([e.name for e in library], "effect")
-        _check_names([s.name for s in sites if s.name != LEARNT], "curve")  # which is what a curve may be called
+        _check_names([s.name for s in sites if s.name != LEARNT], "curve")  # a curve may have that name
         _all_different([*(p.name for p in given), *(e.name for e in library), *(s.name for s in sites)], "name")
         for what, held in (("fixed", fixed), ("tied", tied)):
             if not isinstance(held, Mapping | None):
-                raise DeclarationError(f'{what} is {held!r}: say of which parameters, {{"NAME": ...}}.')
+                raise DeclarationError(f'{what} is {held!r}: give a mapping by parameter, {{"NAME": ...}}.')
         self.held = Held(dict(fixed or {}), dict(tied or {}))
         self.held.check(given, library)
         free = self.held.free(given)
@@ -129,14 +133,14 @@ class FunctionSystem(System):
         self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in free}
         self.parameters = tuple(self._coordinates[p.name].of(p) for p in free)
         self.effects: dict[str, Effect] = {}
-        # Every parameter as it is while nothing is fitted: an effect's as they are when it is off.
+        # the value of every parameter that is not being fitted; an effect's are its values while it is off
         self._off: dict[str, float] = {p.name: p.value for p in given}
         for effect in library:
             self.effects[effect.name], coordinates = of_effect(self.held.without(effect))
             if not np.isfinite(self.effects[effect.name].absent):
                 raise DeclarationError(
-                    f"effect {effect.name} is absent at infinity: its size has to keep its sign, so let one of its"
-                    " bounds be 0, or both on the same side of it, and its value be a typical one, which is not 0."
+                    f"effect {effect.name} is absent at infinity, so its size must keep its sign: set one bound to 0"
+                    " or both bounds on the same side of it, and give a typical value other than 0."
                 )
             self._coordinates |= coordinates
             self._off |= effect.typical | dict.fromkeys(effect.size_names, effect.absent)
@@ -163,8 +167,8 @@ class FunctionSystem(System):
         return f"System({self.name!r}, {len(self.parameters)} parameters, {len(self.effects)} effects)"
 
     def with_trials(self, trials: Iterable[Record]) -> FunctionSystem:
-        """The same system with these measured records. Raises DeclarationError if what is declared of conditions and
-        outputs is of none of them."""
+        """A copy of the system with these measured records. Raises DeclarationError if it declares something for a
+        condition, experiment or output that none of them has."""
         trials = tuple(trials)
         conditions, outputs = {t.condition for t in trials}, {name for t in trials for name in t.channels}
         experiments = {t.experiment for t in trials}
@@ -186,19 +190,20 @@ class FunctionSystem(System):
         return other
 
     def with_floor(self, least: Mapping[tuple[str, str], float]) -> FunctionSystem:
-        """The same system, with lower bounds on its noise floors, by experiment and output."""
+        """A copy of the system with lower bounds on its noise floors, by (experiment, output)."""
         return self._with(_raised=dict(least))
 
     def with_test(self, names: Iterable[str]) -> FunctionSystem:
-        """The same system, the records of these names as the test."""
+        """A copy of the system with the records of these names as the final test."""
         return self._with(_test=tuple(names))
 
     def with_noise_time(self, seconds: Mapping[str, float]) -> FunctionSystem:
-        """The same system, with a declared correlation time of the noise of each output."""
+        """A copy of the system with a declared correlation time of the noise, in seconds, by output."""
         return self._with(_noise_time_s=dict(seconds), estimates_noise_time=False)
 
     def with_grains(self, grains: Mapping[str, float]) -> FunctionSystem:
-        """The same system, with `Parameter.grain` by full name, as fitted, where none is declared."""
+        """A copy of the system with `grains`, by full name and in fitted coordinates, as the `Parameter.grain` of
+        parameters that declare none."""
         effects = {
             name: replace(
                 e, parameters=tuple(replace(p, grain=p.grain or grains.get(e.full_name(p), 0.0)) for p in e.parameters)
@@ -208,10 +213,10 @@ class FunctionSystem(System):
         parameters = tuple(replace(p, grain=p.grain or grains.get(p.name, 0.0)) for p in self.parameters)
         return self._with(parameters=parameters, effects=effects)
 
-    # -- in the person's parameters ---------------------------------------------------------------------------
+    # -- in the user's parameters -----------------------------------------------------------------------------
 
     def coordinate(self, name: str) -> Coordinate:
-        """The coordinate in which parameter `name` is fitted."""
+        """Return the coordinate in which parameter `name` is fitted."""
         return self._coordinates.get(name, PLAIN)
 
     def told(self, parameter: str, value: float) -> float:
@@ -222,7 +227,8 @@ class FunctionSystem(System):
         return coordinate.told(value) * coordinate.slope(coordinate.told(value))
 
     def values(self, theta: Theta, corrections: Sequence[Correction] = ()) -> Values:
-        """The values passed to `simulate` for a fitted `theta`: the user's parameters, curves, absent effects off."""
+        """Return the values passed to `simulate` for a fitted `theta`: the user's parameters and the curves; effects
+        that are not in `theta` are off."""
         found = Values(self._off)
         for name, value in theta.items():
             found[name] = self.told(name, value)
@@ -233,7 +239,7 @@ class FunctionSystem(System):
         return found
 
     def simulated(self, record: Record, values: Values) -> Any:
-        """What `simulate` returns, of a stretch of a longer run its own samples."""
+        """Return what `simulate` returns; for a stretch of a longer run, only the stretch's own samples."""
         if not isinstance(record.payload, Stretch):
             return self.simulated_whole(record, values)
         whole = record.payload
@@ -243,21 +249,21 @@ class FunctionSystem(System):
         return whole.of(found)
 
     def simulated_whole(self, record: Record, values: Values) -> Any:
-        """What `simulate` returns, of copies and as a copy: it may return one array again and again, and is not to
-        write into what was measured. Raises MisuseError, with the column, where it does."""
+        """Call `simulate` on a copy of the record and return a copy of its result, since it may reuse an array and must
+        not write into the measurements. Raises MisuseError, naming the column, if it does write into its input."""
         given = replace(
             record, time_s=_copy(record.time_s), inputs=_copy(record.inputs), channels=_copy(record.channels)
         )
         found = self._called(given, values)
         if changed := _changed(record, given):
             raise MisuseError(
-                f"trial {record.name}: simulate writes into {changed}, which it was given: the next call would find"
-                f' another. Let it work on a copy: record["{changed}"].copy().'
+                f"trial {record.name}: simulate writes into {changed} of its record, so the next call would find"
+                f' different values. Let it work on a copy: record["{changed}"].copy().'
             )
         return found
 
     def _called(self, record: Record, values: Values) -> Any:
-        """A model that fills one array of its own again and again is called by one thread at a time."""
+        """Call `simulate`; once it is seen to reuse an output array, only from one thread at a time."""
         values = values.at_hand()
         if self._refills:
             with _ONE_AT_A_TIME:
@@ -268,7 +274,7 @@ class FunctionSystem(System):
         return _copy(found)
 
     def run(self, record: Record, values: Values) -> Channels:
-        """The result of `simulate`, in whatever form, as channels by name."""
+        """Return the result of `simulate`, whatever its form, as channels by name."""
         found = self.simulated(record, values)
         if not isinstance(found, Mapping):
             if len(record.channels) != 1:
@@ -279,7 +285,7 @@ class FunctionSystem(System):
             found = {next(iter(record.channels)): found}
         return {name: np.asarray(column) for name, column in found.items()}
 
-    # -- what the engine asks ----------------------------------------------------------------------------------
+    # -- the engine's protocol ---------------------------------------------------------------------------------
 
     def predict(
         self,
@@ -292,7 +298,7 @@ class FunctionSystem(System):
     ) -> Channels:
         try:
             return self.run(trial, self.values(theta, corrections))
-        except (ArithmeticError, np.linalg.LinAlgError):  # there is no simulation so far out
+        except (ArithmeticError, np.linalg.LinAlgError):  # the parameters are too extreme to simulate
             return _failed(trial)
 
     def predict_trials(
@@ -305,9 +311,9 @@ class FunctionSystem(System):
         corrections: Sequence[Sequence[Correction]] = (),
         alike: bool = False,
     ) -> list[Channels]:
-        """As `predict`, but that a search goes on where a model that can be simulated from its initial values cannot:
-        a ValueError, and an output of another shape than was measured, count as NaN. Raises MisuseError, with trial
-        and values, for any other error of the model."""
+        """As `predict`, but a failed simulation does not stop the search: if the model raises a ValueError or returns
+        an output whose shape differs from the measured one, the prediction is NaN. Raises MisuseError, naming trial and
+        values, for any other error of the model."""
         corrections = corrections or [()] * len(thetas)
         return [self._sought(*one, effects) for one in zip(thetas, trials, corrections, strict=True)]
 
@@ -381,7 +387,7 @@ class FunctionSystem(System):
 
 
 def _told_by(what: str, trial: Record, ask: Callable[[], Any]) -> Any:
-    """What a function of the user's says of a record. Raises MisuseError where it fails."""
+    """Call a user's function for a trial. Raises MisuseError if it fails."""
     try:
         return ask()
     except LacunaError:
@@ -391,21 +397,21 @@ def _told_by(what: str, trial: Record, ask: Callable[[], Any]) -> Any:
 
 
 def _copy(found: Any) -> Any:
-    """Of a column, or of every one by its name, as far as these are arrays."""
+    """Copy a column, or every column of a mapping; objects that are not arrays are returned as they are."""
     if isinstance(found, Mapping):
         return {name: _copy(column) for name, column in found.items()}
     return found.copy() if isinstance(found, np.ndarray) else found
 
 
 def _shares(found: Any, earlier: Any) -> bool:
-    """Whether two results of a model lie in the same memory."""
+    """Whether two results of a model share memory."""
     both = (f.values() if isinstance(f, Mapping) else [f] for f in (found, earlier))
     one, other = ([column for column in columns if isinstance(column, np.ndarray)] for columns in both)
     return any(np.may_share_memory(a, b) for a in one for b in other)
 
 
 def _changed(before: Record, after: Record) -> str | None:
-    """The name of a column whose samples are not what they were."""
+    """Return the name of the first column whose samples differ, or None."""
     if not _is_same(before.time_s, after.time_s):
         return "time_s"
     for old, new in ((before.inputs, after.inputs), (before.channels, after.channels)):
@@ -416,12 +422,12 @@ def _changed(before: Record, after: Record) -> str | None:
 
 
 def _is_same(one: Any, other: Any) -> bool:
-    """To the last bit, which is quick and knows NaN."""
+    """Whether two columns are bitwise equal: fast, and NaN equals NaN."""
     return not isinstance(one, np.ndarray) or (isinstance(other, np.ndarray) and one.tobytes() == other.tobytes())
 
 
 def _library(effects: Iterable[Effect] | Effect) -> tuple[Effect, ...]:
-    """`effects` given as a sequence, or as the mapping that the engine uses."""
+    """Return `effects`, given as one effect, a sequence, or a mapping by name, as a tuple."""
     if isinstance(effects, Mapping):
         for key, effect in effects.items():
             if key != effect.name:
@@ -435,20 +441,22 @@ def _failed(trial: Record) -> Channels:
 
 
 def _check_names(names: Sequence[str], what: str) -> None:
-    """`theta.NAME` has to lead to them, and nothing that is learnt may have them."""
+    """Raise DeclarationError if a name cannot be reached as `theta.NAME`, is reserved for learnt curves, or is used
+    twice."""
     for name in names:
         if "." in name or name == LEARNT or hasattr(Values, name):
-            raise DeclarationError(f"{what} {name!r}: choose another name, without a dot; this one is not free.")
+            raise DeclarationError(f"{what} {name!r}: choose another name, without a dot; this one is reserved.")
     _all_different(names, what)
 
 
 def _check_amounts(what: str, told: Any, by_output: bool) -> None:
-    """None, or amounts by output; where that is not asked for, one for all or a word will do."""
+    """Raise DeclarationError unless `told` is None or maps outputs to non-negative numbers; unless `by_output`, a
+    single number or a word is accepted, too."""
     if told is None or (isinstance(told, str) and not by_output):
         return
     if not isinstance(told, Mapping):
         if by_output:
-            raise DeclarationError(f'{what} is told by output: write {{"OUTPUT": {told!r}}}.')
+            raise DeclarationError(f'{what} is given by output: write {{"OUTPUT": {told!r}}}.')
         told = {"all outputs": told}
     for output, amount in told.items():
         if not isinstance(amount, Real) or not 0.0 <= float(amount) < math.inf:
@@ -471,7 +479,7 @@ def _all_different(names: Sequence[str], what: str) -> None:
 
 
 def _regressors(record: Record, prediction: Channels) -> dict[str, np.ndarray]:
-    """The outputs, their rates and directions of change, the inputs, and time."""
+    """Default regressors: the outputs, their rates and directions of change, the inputs, and time."""
     found: dict[str, np.ndarray] = {}
     for name, column in prediction.items():
         rate = np.gradient(column, record.time_s)

@@ -1,4 +1,4 @@
-"""Parameters that are not fitted: fixed at a value that is known, or tied to another parameter."""
+"""Parameters that are not fitted: fixed at a known value or tied to another parameter."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lacuna.system import Effect, Parameter
 
 @dataclass(frozen=True)
 class Held:
-    """`fixed`: value by name. `tied`: by name, the parameter that it always equals."""
+    """Held parameters. `fixed` maps names to values, `tied` maps names to the parameter that each always equals."""
 
     fixed: Mapping[str, float]
     tied: Mapping[str, str]
@@ -22,39 +22,39 @@ class Held:
         return name in self.fixed or name in self.tied
 
     def fill(self, values: dict[str, float]) -> None:
-        """Set what is held in `values`, which has all the others."""
+        """Set the held parameters in `values`, which contains all others."""
         values.update(self.fixed)
         values.update({name: values[other] for name, other in self.tied.items()})
 
     def free(self, parameters: Iterable[Parameter]) -> list[Parameter]:
-        """Those that are fitted."""
+        """Return those of `parameters` that are fitted."""
         return [p for p in parameters if p.name not in self]
 
     def without(self, effect: Effect) -> Effect:
-        """`effect` with those of its parameters that are fitted."""
+        """Return `effect` with only those of its parameters that are fitted."""
         parameters = tuple(p for p in effect.parameters if effect.full_name(p) not in self)
         frequency = effect.frequency if effect.frequency in [p.name for p in parameters] else None
         return replace(effect, parameters=parameters, frequency=frequency)
 
     def of(self, effects: Collection[str]) -> list[str]:
-        """Names of those of the base model and of these effects."""
+        """Names of the held parameters of the base model and of `effects`."""
         return [name for name in (*self.fixed, *self.tied) if "." not in name or name.split(".")[0] in effects]
 
     def check(self, parameters: Sequence[Parameter], library: Sequence[Effect]) -> None:
-        """Raises DeclarationError where one of these may not be held, or not in this way."""
+        """Raise DeclarationError if one of the parameters cannot be held, or not in this way."""
         sizing = {name for effect in library for name in effect.size_names}
         shaping = [(name, p) for e in library for p in e.parameters if (name := e.full_name(p)) not in sizing]
         able = dict([*((p.name, p) for p in parameters), *shaping])
         for name in (*self.fixed, *self.tied):
             if name in sizing:
-                raise DeclarationError(f"{name} sizes an effect, so it can be neither fixed nor tied.")
+                raise DeclarationError(f"{name} sets the size of an effect, so it can be neither fixed nor tied.")
             if name not in able:
                 raise DeclarationError(f"fixed or tied: there is no {name}; there are {', '.join(able)}.")
         for name, value in self.fixed.items():
             if name in self.tied:
                 raise DeclarationError(f"{name} is both fixed and tied: choose one of the two.")
             if not isinstance(value, Real) or not isfinite(value):
-                raise DeclarationError(f"{name} is fixed at {value!r}, which is no number.")
+                raise DeclarationError(f"{name} is fixed at {value!r}, which is not a finite number.")
             lower, upper = able[name].lower, able[name].upper
             if not (lower <= value <= upper or able[name].periodic):
                 raise DeclarationError(f"{name} is fixed at {value:g}, outside its bounds {lower:g} to {upper:g}.")

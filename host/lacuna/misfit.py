@@ -1,11 +1,11 @@
-"""What a diagnosis leaves tells of the floor it was made against: its level, and the correlation time of the noise.
+"""Revise the noise floor after a diagnosis, from the residual of the best explanation: its level and correlation time.
 
-Where nothing on offer comes near the floor, explanations are compared at the level of what the best of them leaves.
-Residuals of thousands of floors are compressed in a fit, so that one bad sample cannot outweigh everything; where all
-samples are that bad, explanations that differ by ten times look alike. The comparison is then made again with a floor
-raised to a fraction of what was left, for as long as that leaves less.
+Large residuals are compressed in a fit, so that one bad sample cannot outweigh everything. If no explanation comes near
+the floor, all samples are that bad, and explanations whose errors differ by a factor of ten look alike. The diagnosis
+is then repeated with the floor raised to a fraction of the best explanation's residual, for as long as that lowers the
+residual.
 
-Where no repeats show the noise's correlation time, that of the residual stands for it.
+If there are no repeats to show the noise's correlation time, that of the residual is used instead.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from lacuna.estimation.problem import SOFT_LIMIT
 from lacuna.estimation.sampling import correlation_samples, evenly, sample_period
 from lacuna.function_system import FunctionSystem
 
-_FRACTION = 0.05  # of what is left: still within reach of the range in which residuals count by their squares
-_WORTH = 1.25  # times the floor: raised by less, it would change no comparison
+_FRACTION = 0.05  # of the residual, as the raised floor: residuals are then only moderately compressed
+_WORTH = 1.25  # times the floor; raising it by less would change no comparison
 _ROUNDS = 3
-_LONG = 3.0  # samples: what remembers itself for less is white for all that matters
+_LONG = 3.0  # samples; a residual correlated over fewer counts as white
 
 Key = tuple[str, str]
 
@@ -32,8 +32,8 @@ Key = tuple[str, str]
 def compared_at_misfit(
     system: FunctionSystem, found: Diagnosis, again: Callable[[FunctionSystem], Diagnosis]
 ) -> tuple[Diagnosis, dict[Key, float]]:
-    """The diagnosis at the level of its own misfit, and by experiment and channel the floor that was raised, as it was;
-    `found` and nothing where it is near its floor."""
+    """Repeat a diagnosis with raised floors if it is far from them. Returns the diagnosis, and the original value of
+    each floor that was raised, by (experiment, channel); `found` and an empty dict if no floor had to be raised."""
     was = {key: noise.sd for key, noise in found.search.floor.channels.items()}
     raised: dict[Key, float] = {}
     left = _left(found)
@@ -47,13 +47,13 @@ def compared_at_misfit(
         if next_found.verdict == "none" or (raised and _mean_log(next_left, left) >= 0.0):
             break
         found, left, raised = next_found, next_left, {key: was[key] for key in level}
-        if _mean_log(left, level) > 0.0:  # what is left shows above the raised floor: nothing was good enough too soon
+        if _mean_log(left, level) > 0.0:  # so the raised floor made no explanation pass as sufficient too early
             break
     return found, raised
 
 
 def _left(found: Diagnosis) -> dict[Key, float]:
-    """RMS of what the final explanation leaves on the trials that it is fitted to, in the channels' units."""
+    """RMS residual of the final explanation on its fitted trials, in the channels' units."""
     squares: dict[Key, list[float]] = {}
     residuals = found.final.residuals()
     for trial in found.final.problem.trials:
@@ -64,12 +64,12 @@ def _left(found: Diagnosis) -> dict[Key, float]:
 
 
 def _mean_log(one: dict[Key, float], other: dict[Key, float]) -> float:
-    """By how much `one` is above `other`, where both are known."""
+    """Mean logarithm of the ratio of `one` to `other`, over their common keys."""
     return float(np.mean([np.log(one[key] / other[key]) for key in one.keys() & other.keys()]))
 
 
 def left_over_s(diagnosis: Diagnosis) -> dict[str, float]:
-    """By channel without repeats the correlation time of the residual, in seconds, 0 where it is white."""
+    """Correlation time of the residual in seconds, by channel without repeats; 0 if it is white."""
     trials, floor = diagnosis.base.structure.system.trials, diagnosis.search.floor
     residuals = evaluate_on(diagnosis.final, trials).residuals()
     traces: dict[Key, list[np.ndarray]] = defaultdict(list)
@@ -82,7 +82,7 @@ def left_over_s(diagnosis: Diagnosis) -> dict[str, float]:
                 periods[key].append(sample_period(trial.time_s))
     found: dict[str, float] = defaultdict(float)
     for key, members in traces.items():
-        samples = correlation_samples(members)  # of exponential memory: twice the correlation time
+        samples = correlation_samples(members)  # twice the correlation time, for an exponential correlation
         seconds = 0.5 * samples * float(np.median(periods[key])) if samples > _LONG else 0.0
         found[key[1]] = max(found[key[1]], seconds)
     return found

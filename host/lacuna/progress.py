@@ -1,4 +1,4 @@
-"""How far a diagnosis has come, of how much, and how long it may still take: one line on the terminal."""
+"""Progress of a diagnosis as one line on the terminal: steps done, steps in total, and the time that is left."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import sys
 import time
 from typing import TextIO
 
-_QUIET_S = 2.0  # what is over before then says nothing
-_RACED = 6  # sets of a size that are fitted besides those of which a score says little, a library of them at most
-_FORMS = 6  # steps of trying an explanation in a form of its own
+_QUIET_S = 2.0  # a shorter diagnosis shows nothing
+_RACED = 6  # sets of each size that are fitted, apart from those whose score says little (at most one per effect)
+_FORMS = 6  # steps of trying an explanation with a learnt curve
 
 
 def most_steps(effects: int) -> int:
-    """How many steps a diagnosis with a library of so many effects announces at most, base fit and verdict included."""
-    scored = 2 + 3 + 2  # libraries: of the base model, and again if it was in a wrong minimum; for pairs; for three
+    """Largest number of steps that a diagnosis with `effects` effects announces, base fit and verdict included."""
+    scored = 2 + 3 + 2  # the library on the base model, again if that was in a local optimum; for pairs; for triples
     raced = 4 * (_RACED + effects) + 2 * 3 + 2 + 1
     return 3 + 4 + scored * effects + raced + 3 * (1 + _FORMS)
 
 
 class Progress:
-    """Called with what begins now. The total is what a search may take at most: many end sooner, and the time left
-    is an upper bound of the same kind."""
+    """Progress callback, called with a description of each step as it begins. The total is an upper bound, and so is
+    the time left: many searches end sooner."""
 
     def __init__(self, effects: int, stream: TextIO | None = None):
         self._total, self._stream = most_steps(effects), stream or sys.stderr
@@ -42,7 +42,7 @@ class Progress:
         self._shown = True
 
     def end(self) -> None:
-        """Take the line away."""
+        """Clear the line."""
         if self._shown and self._stream.isatty():
             self._stream.write("\r\x1b[K")
             self._stream.flush()

@@ -1,4 +1,4 @@
-"""Measured records from common formats: arrays, pandas, xarray, a folder of CSV; and stretches of one long record."""
+"""Read measured records from arrays, pandas, xarray or a folder of CSV files, and cut up one long record."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from lacuna.errors import LacunaError, listed
 from lacuna.system import Record
 from lacuna.values import plain
 
-TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # of a second
+TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # per second
 _LABELS = ("name", "experiment", "condition", "order")
-_FEWEST = 8  # samples of a stretch
-_MOST_NAMED = 8  # columns in a message
+_FEWEST = 8  # samples in a window or segment
+_MOST_NAMED = 8  # columns listed in a message
 _NUMERIC = b"0123456789+-.eE, \t\r\n"
 _TRUTHS = {"true": 1.0, "false": 0.0}
 
 
 class RecordError(LacunaError):
-    """A record cannot be used as it is; the text names it and its column."""
+    """A record cannot be used; the message names the record and its column."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """One record before it is known which of its columns are outputs. `labels`: of `_LABELS` those that it has.
-    `clock`: the column that the times came from."""
+    """A record before it is known which of its columns are outputs. `labels` holds those of `_LABELS` that it has,
+    `clock` the name of the column that the times came from."""
 
     name: str
     time_s: np.ndarray
@@ -44,7 +44,8 @@ class Table:
     clock: str = ""
 
     def record(self, outputs: Sequence[str]) -> Record:
-        """`outputs` become channels, all other columns inputs. Raises RecordError where one is missing."""
+        """Return a `Record` with `outputs` as channels and all other columns as inputs. Raises RecordError if an output
+        is missing."""
         for output in outputs:
             if output not in self.columns:
                 raise RecordError(
@@ -63,19 +64,19 @@ class Table:
 
 
 def read(data: Any) -> list[Record | Table]:
-    """Records from any of
+    """Read records from any of these:
 
-    - one record or a sequence of them, or a mapping from names to them, each a mapping from columns to arrays, a pandas
-      DataFrame, an xarray Dataset (one dimension), or a `Record`,
-    - a DataFrame with a column `name`, or an xarray Dataset with a second dimension, for many in one,
-    - a folder: one CSV file per record, column names in its first line. Files that differ only by a number at the end
-      (`step_1.csv`, `step_2.csv`, numbered without a gap) are repeats of one condition, if no column `condition` says
-      otherwise. Hidden files are none of it.
+    - One record, a sequence of records, or a mapping from names to records, each of them a mapping from columns to
+      arrays, a pandas DataFrame, an xarray Dataset (one dimension), or a `Record`.
+    - A DataFrame with a column `name`, or an xarray Dataset with a second dimension, that holds many records.
+    - A folder with one CSV file per record, with the column names in its first line. Files whose names differ only by a
+      number at the end (`step_1.csv`, `step_2.csv`, numbered without a gap) are repeats of one condition, unless a
+      column `condition` says otherwise. Hidden files are ignored.
 
-    A column `time_s` (or `time`, `t`; the index in pandas and xarray) holds seconds, `time_ms` and `time_us` what they
-    say, or it holds dates. Single values per record, and what is called `condition` (records with an equal one are
-    repeats), `experiment`, `order` (its place in the day), may be among the columns or in `attrs`. Columns are copied:
-    what is missing or masked is NaN, true and false are 1 and 0. Raises RecordError.
+    The times are a column, or an index of pandas or xarray, called `time_s`, `time` or `t` (seconds), `time_ms` or
+    `time_us`; they may also be dates. Single values of a record, and its labels `condition` (records with an equal one
+    are repeats), `experiment` and `order` (position in the day), may be columns or entries of `attrs`. Columns are
+    copied; missing or masked samples become NaN, true and false become 1 and 0. Raises RecordError.
     """
     if isinstance(data, str | Path):
         return _folder(Path(data))
@@ -86,8 +87,8 @@ def read(data: Any) -> list[Record | Table]:
     if isinstance(data, Mapping):
         if data and all(isinstance(column, np.ndarray) for column in data.values()):
             raise RecordError(
-                f"a record of {listed(data, _MOST_NAMED)} has no times: give a column time_s, in seconds (of static"
-                " data the number of the row)."
+                f"a record of {listed(data, _MOST_NAMED)} has no times: give a column time_s, in seconds (for static"
+                " data, the row number)."
             )
         return [_table(one, str(name)) for name, one in data.items()]
     if isinstance(data, Iterable):
@@ -112,12 +113,12 @@ def _is_xarray(data: Any) -> bool:
 
 
 def _parts(data: Any) -> list[tuple[str, Any]]:
-    """A table that holds many records, one at a time."""
+    """Split a table into its records: pairs of name and part."""
     if _is_pandas(data) and "name" in data.columns:
         if (missing := data["name"].isna().to_numpy()).any():
             row = int(np.flatnonzero(missing)[0])
             raise RecordError(
-                f"row {row} (counted from 0) has no name: which record is it of? Fill in the column name."
+                f"row {row} (counted from 0) has no name: fill in the column `name` to say which record it belongs to."
             )
         return [(str(name), part) for name, part in data.groupby("name", sort=False)]
     if _is_xarray(data) and len(data.sizes) == 2:
@@ -151,7 +152,7 @@ def _of_columns(data: Any, name: str) -> Table:
 
 
 def _columns(data: Any, name: str) -> tuple[dict[str, Any], dict[str, Any], Any]:
-    """Columns, attributes, and what the index says of time."""
+    """Return the columns, the attributes, and the times if the index is one of dates (else None)."""
     if _is_pandas(data):
         names = [str(c) for c in data.columns]
         if twice := [n for n in names if names.count(n) > 1]:
@@ -171,13 +172,14 @@ def _columns(data: Any, name: str) -> tuple[dict[str, Any], dict[str, Any], Any]
 
 
 def _of_series(column: Any) -> np.ndarray:
-    """A column of pandas; times of a zone as those of UTC."""
+    """Return a pandas column as an array; times with a time zone are converted to UTC."""
     zoned = getattr(column.dtype, "tz", None) is not None
     return (column.dt.tz_convert(None) if zoned else column).to_numpy()
 
 
 def _own(column: Any, record: str, name: str) -> Any:
-    """What a model is given under a name: samples, a single value as it is, or a function."""
+    """Return an input as the model gets it: samples as numbers, a single value or a function unchanged, the words true
+    and false as 1 and 0."""
     if callable(column):
         return column
     if np.ndim(column) == 0:
@@ -186,7 +188,8 @@ def _own(column: Any, record: str, name: str) -> Any:
 
 
 def _samples(column: Any, record: str, name: str) -> np.ndarray:
-    """Numbers in an array of the record's own: nobody else's are changed where a model writes into it."""
+    """Return a column as numbers in a new array, so that a model that writes into it cannot change the user's data.
+    Raises RecordError."""
     if isinstance(column, np.ma.MaskedArray):
         masked: Any = column.astype(float if column.dtype.kind in "fiub" else object)
         column = masked.filled(np.nan)
@@ -198,14 +201,14 @@ def _samples(column: Any, record: str, name: str) -> np.ndarray:
         at = cells.index(None)
         seconds = "; count seconds from its start" if name in TIMES else ""
         raise RecordError(
-            f"record {record}, sample {at}: column {name} is not all numbers: {column.ravel()[at]!r}{seconds}. A model"
-            " computes with numbers: write some, or leave the column out."
+            f"record {record}, sample {at}: column {name} has {column.ravel()[at]!r}, which is not a number{seconds}."
+            " Replace it by a number, or leave the column out."
         )
     return np.array(cells, float).reshape(column.shape)
 
 
 def _of_cell(cell: Any) -> float | None:
-    """A number, NaN for what is missing; None for what is no number."""
+    """Return a cell as a number; NaN if it is missing, None if it is not a number."""
     if _is_missing(cell):
         return np.nan
     if isinstance(cell, str):
@@ -221,7 +224,7 @@ def _is_missing(cell: Any) -> bool:
 
 
 def _seconds(time: Any, name: str) -> np.ndarray:
-    """Dates and durations count from the first; of a zone they need not be."""
+    """Return times as numbers; dates (with or without a time zone) and durations become seconds since the first."""
     dates = np.asarray(time)
     if dates.dtype == object and len(dates) and all(isinstance(date, datetime) for date in dates):
         return np.array([(date - dates[0]).total_seconds() for date in dates])
@@ -234,10 +237,10 @@ def _single(column: Any, record: str, label: str) -> Any:
     cells = np.asarray(column).ravel()
     if missing := [at for at, cell in enumerate(cells) if _is_missing(cell)]:
         raise RecordError(
-            f"record {record}, sample {missing[0]}: its {label} is missing; every sample has the same one."
+            f"record {record}, sample {missing[0]}: its {label} is missing; give every sample the same one."
         )
     if len(set(cells.tolist())) != 1:
-        raise RecordError(f"record {record}: its {label} differs from sample to sample; it must have one.")
+        raise RecordError(f"record {record}: its {label} differs between samples; give every sample the same one.")
     return cells[0]
 
 
@@ -246,7 +249,7 @@ def _whole(order: Any, record: str) -> int | None:
         return None
     whole = number(order) if isinstance(order, str) else plain(order)
     if not isinstance(whole, Real) or not float(whole).is_integer():
-        raise RecordError(f"record {record}: its order is {order!r}: give its place in the day, a whole number.")
+        raise RecordError(f"record {record}: its order is {order!r}: give its position in the day, a whole number.")
     return int(float(whole))
 
 
@@ -264,19 +267,19 @@ def _folder(folder: Path) -> list[Record | Table]:
 
 
 def _is_listed(file: Path) -> bool:
-    """Not what an operating system or an office program leaves behind (._x.csv, ~$x.csv)."""
+    """Whether to read a file: not if an operating system or office program left it behind (._x.csv, ~$x.csv)."""
     return file.is_file() and not file.name.startswith((".", "~$"))
 
 
 def _stem(stem: str) -> tuple[str, int | None]:
-    """A file's name without a number at its end, and that number."""
+    """Split a file's stem into the part before a number at its end, and that number (None if there is none)."""
     found = re.fullmatch(r"(.*?)[ _-]?([0-9]+)", stem)
     return (found[1] or stem, int(found[2])) if found else (stem, None)
 
 
 def _refuse_settings(tables: Mapping[str, Table]) -> None:
-    """Names that differ by a number are taken for repeats; a number that does not count them may well be a setting,
-    whose effect would pass for noise. Raises RecordError."""
+    """Raise RecordError if files whose names differ by a number are not numbered consecutively: they would be taken for
+    repeats, but the number may well be a setting, whose effect would pass for noise."""
     numbers: dict[str, list[int]] = defaultdict(list)
     for condition, count in map(_stem, tables):
         if count is not None:
@@ -298,8 +301,8 @@ def _csv(file: Path) -> Table:
 
 
 def numbers_alone(file: Path) -> dict[str, np.ndarray] | None:
-    """The columns of a file that has one line of names and below it plain numbers only, which NumPy reads at a tenth
-    of the cost; None of any other, which is gone through cell by cell."""
+    """Read the columns of a CSV file that has one line of names and plain numbers below, which NumPy parses ten times
+    faster; return None for any other file, which has to be read cell by cell."""
     with file.open("rb") as lines:
         head = lines.readline().decode("utf-8-sig", "replace").rstrip("\r\n")
         if "\r" in head or '"' in head:
@@ -325,6 +328,7 @@ def numbers_alone(file: Path) -> dict[str, np.ndarray] | None:
 
 
 def cell_by_cell(file: Path) -> dict[str, np.ndarray]:
+    """Read the columns of any CSV file. Raises RecordError, naming line and column."""
     (_, names), *rows = _lines(file)
     names = [name.strip() for name in names]
     for mark, what in ((";", "semicolons"), ("\t", "tabs")):
@@ -336,7 +340,7 @@ def cell_by_cell(file: Path) -> dict[str, np.ndarray]:
     for line, row in rows:
         if len(row) != len(names):
             above = len(widths) == 1 or max(widths) > len(names)
-            preamble = " If the names stand further down, remove the lines above them." if above else ""
+            preamble = " If the column names are further down, remove the lines above them." if above else ""
             raise RecordError(f"{file.name}, line {line}: {len(row)} values for {len(names)} columns.{preamble}")
     if twice := [name for name in names if names.count(name) > 1]:
         raise RecordError(f"{file.name} has more than one column {twice[0]!r}: give each its own name.")
@@ -345,15 +349,15 @@ def cell_by_cell(file: Path) -> dict[str, np.ndarray]:
 
 
 def _lines(file: Path) -> list[tuple[int, list[str]]]:
-    """The cells of each line that holds any, with its number, the columns' names first; remarks (#) are left out."""
+    """Return line number and cells of every line that is neither empty nor a comment (#), the column names first."""
     try:
-        with file.open(newline="", encoding="utf-8-sig") as lines:  # a spreadsheet begins its files with a mark
+        with file.open(newline="", encoding="utf-8-sig") as lines:  # spreadsheets write a byte order mark
             reader = csv.reader(lines, skipinitialspace=True)
             written = [(reader.line_num, row) for row in reader if "".join(row)]
     except UnicodeDecodeError:
         raise RecordError(_encoding(file)) from None
     except csv.Error as error:
-        raise RecordError(f"{file.name} is no table of text: {error}") from None
+        raise RecordError(f"{file.name} cannot be read as CSV: {error}") from None
     width = max((len(row) for _, row in written if not row[0].startswith("#")), default=0)
     found = [(line, row) for line, row in written if not _is_remark(row, width)]
     if not found:
@@ -365,38 +369,40 @@ def _lines(file: Path) -> list[tuple[int, list[str]]]:
 
 
 def _encoding(file: Path) -> str:
-    """Where a file stops to be UTF-8, and what to do."""
+    """Return a message that says where a file is not UTF-8, and what to do."""
     raw = file.read_bytes()
     try:
         raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line, byte = raw.count(b"\n", 0, error.start) + 1, raw[error.start]
     return (
-        f"{file.name}, line {line}: byte 0x{byte:02x} is not UTF-8; save it as UTF-8 text (what begins with 0xff or"
-        " 0xfe is UTF-16, as spreadsheets write it), or read it with pandas, read_csv(..., encoding=...), and give the"
-        " table."
+        f"{file.name}, line {line}: byte 0x{byte:02x} is not UTF-8; save it as UTF-8 text (a file that begins with 0xff"
+        " or 0xfe is UTF-16, as spreadsheets write it), or read it with pandas, read_csv(..., encoding=...), and give"
+        " the table."
     )
 
 
 def _is_remark(row: Sequence[str], width: int) -> bool:
-    """Not what a spreadsheet writes where it has no number (#N/A, #VALUE!), which is a row like the others."""
+    """Whether a row is a comment; a row that begins with a spreadsheet's error value (#N/A, #VALUE!) is not."""
     return row[0].startswith("#") and not (len(row) == width > 1 and re.fullmatch(r"#[A-Z/0-9]+[!?]?", row[0].strip()))
 
 
 def _names_in_remark(remarks: Sequence[list[str]], cells: list[str], file: Path, line: int) -> tuple[int, list[str]]:
-    """The columns' names, where numpy.savetxt wrote them as a remark right above the first row of numbers, `cells`."""
+    """Return the column names if, as numpy.savetxt writes them, they are the comment right above `cells`, the first row
+    of numbers. Raises RecordError if they are not."""
     names = [cell.lstrip("#").strip() for cell in remarks[-1]] if remarks else []
     parted = all(_of_cell(cell) is not None for cell in cells)
     if parted and len(names) == len(cells) and any(time in names for time in TIMES):
         return line - 1, names
     raise RecordError(
-        f"{file.name}, line {line}: numbers where the names of the columns belong. With numpy:"
+        f"{file.name}, line {line}: numbers where the column names should be. With numpy:"
         ' savetxt(file, rows, delimiter=",", header="time_s,force_N", comments="").'
     )
 
 
 def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) -> np.ndarray:
-    """Numbers, NaN where a cell is empty, 1 and 0 where it is true or false; of labels it may be text."""
+    """Convert a column's cells to numbers: NaN if empty, 1 and 0 for true and false. Labels may be text. Raises
+    RecordError for any other text."""
     values = [_of_cell(cell) for cell in cells]
     if None not in values:
         return np.array(values)
@@ -416,13 +422,13 @@ def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) ->
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of a longer run: the `run` as far as its end, and the `first` sample that is its own."""
+    """A stretch of a longer run: the `run` up to the stretch's end, and the index of the stretch's `first` sample."""
 
     run: Record
     first: int
 
     def of(self, column: Any) -> np.ndarray:
-        """The stretch's own samples of a column of the run."""
+        """Return the stretch's own samples of a column of the run."""
         column = np.asarray(column)
         return column[self.first :] if column.ndim else column
 
@@ -430,12 +436,12 @@ class Stretch:
 def windows(
     data: Any, seconds: float, *, every: float | None = None, period: float | None = None, skip: float = 0.0
 ) -> list[Table]:
-    """One long record cut into windows of `seconds`, each a record with times from 0, and so with its own initial
-    state: let `simulate` take it from the window's first samples or from nuisances.
+    """Cut one long record into windows of `seconds`, each a record whose times start at 0.
 
-    A window starts every `every` seconds (default: where the last ended) after the first `skip`. Windows at the same
-    phase of each `period` of a periodic input are repeats of one another; without it there are none. Raises
-    RecordError.
+    Each window has its own initial state: let `simulate` take it from the window's first samples or from nuisances.
+    After the first `skip` seconds, a window starts every `every` seconds (default: where the previous one ended). If
+    the input is periodic, give its `period`, in seconds: windows at the same phase are then repeats of one another;
+    without it there are no repeats. Raises RecordError.
     """
     table = _one_long(data)
     time = table.time_s - table.time_s[0]
@@ -447,7 +453,7 @@ def windows(
             raise RecordError(f"record {table.name}: {what} is {given!r}; its samples are {sample:g} s apart.")
     starts = np.arange(skip, time[-1] - seconds + 1.5 * sample, every)
     if len(starts) < 3:
-        raise RecordError(f"record {table.name} has {time[-1]:.4g} s: not enough for three windows of {seconds:g} s.")
+        raise RecordError(f"record {table.name} lasts {time[-1]:.4g} s, too short for three windows of {seconds:g} s.")
     size = round(seconds / sample)
     found = []
     for place, start in enumerate(starts):
@@ -463,12 +469,12 @@ def windows(
 
 
 def segments(data: Any, count: int = 10) -> list[Table]:
-    """One long record as `count` stretches of one free run: each is simulated from the run's beginning to its own end
-    and compared on its own samples. For records whose initial state is known only at the start; costs about half of
-    `count` times a simulation of the whole. Raises RecordError."""
+    """Cut one long record into `count` segments of a single free run, for records whose initial state is known only at
+    the start. Each segment is simulated from the beginning of the record to the segment's end and compared on its own
+    samples. The cost is about `count` / 2 simulations of the whole record. Raises RecordError."""
     table = _one_long(data)
     if not isinstance(count, int) or count < 3:
-        raise RecordError(f"record {table.name}: {count!r} segments; a diagnosis needs a whole number, 3 or more.")
+        raise RecordError(f"record {table.name}: {count!r} segments: give a whole number, 3 or more.")
     ends = np.linspace(0, len(table.time_s), count + 1).astype(int)
     if len(table.time_s) < count * _FEWEST:
         raise RecordError(f"record {table.name} has {len(table.time_s)} samples: too few for {count} segments.")
@@ -482,7 +488,7 @@ def segments(data: Any, count: int = 10) -> list[Table]:
 
 
 def falling(time_s: np.ndarray) -> str:
-    """Where times do not increase, in words; empty where they do."""
+    """Describe where times fail to increase; empty if they always do."""
     at = np.flatnonzero(~(time_s[1:] > time_s[:-1]))  # a difference of unsigned integers is never negative
     if not len(at):
         return ""
@@ -491,12 +497,13 @@ def falling(time_s: np.ndarray) -> str:
 
 
 def _part(table: Table, name: str) -> str:
-    """The name of a part of a record: with the record's own, if it has one, so that parts of several go together."""
+    """Return the name of a part of a record, prefixed by the record's own if it has one, so that parts of several
+    records can be used together."""
     return f"{table.labels['name']}, {name}" if "name" in table.labels else name
 
 
 def stretched(table: Table, record: Record, outputs: Sequence[str]) -> Record:
-    """`record` with the run that it is a stretch of, where it is one."""
+    """Attach to `record` the run that it is a stretch of, if `table` is a segment; otherwise return it unchanged."""
     if "stretch" not in table.labels:
         return record
     whole, first, last = table.labels["stretch"]
@@ -510,10 +517,10 @@ def _along(column: Any, table: Table) -> bool:
 
 
 def _one_long(data: Any) -> Table:
-    """The record that windows and segments are cut from, by time. Raises RecordError."""
+    """Read the single record that is to be cut. Raises RecordError if there are several or times do not increase."""
     found = [one for one in read(data) if isinstance(one, Table)]
     if len(found) != 1:
-        raise RecordError("give one long record to be cut.")
+        raise RecordError("give one long record to cut up.")
     if said := falling(found[0].time_s):
         raise RecordError(f"record {found[0].name}: {said}: sort it by time, or give its parts one by one.")
     return found[0]

@@ -1,4 +1,4 @@
-"""From a system and records to a verdict: `lacuna.diagnose`."""
+"""`lacuna.diagnose`: from a system and records to a verdict."""
 
 from __future__ import annotations
 
@@ -44,25 +44,30 @@ def diagnose(
     suspected: Iterable[str] = (),
     progress: Callable[[str], None] | bool = True,
 ) -> Verdict:
-    """What the model of `system` lacks, judged by `records`.
+    """Diagnose what the model of `system` lacks, from `records`.
 
-    `records`: arrays, pandas, xarray, a folder of CSV (see `lacuna.records.read`), or None for a system that already
-    has trials. `seed`: the same seed gives the same verdict; `random_state`: the same under the name that scikit-learn
-    has for it, or a generator that draws one. `test`: names of records that are to choose nothing and to be the test;
-    by default some of each condition. `starts`: number of initial points of the base model's fit. `n_jobs`: number of
-    processes that try explanations, -1 for one per core; by default one process with a thread per core, which suits a
-    `simulate` that releases the GIL (NumPy, numba). `executor`: used instead of these, any from `concurrent.futures`,
-    or dask's. `suspected`: effects that are fitted whatever they promise, since something else speaks for them, such as
-    a verdict on other records; they are judged like all others. `progress`: a function called with a description of
-    each step, or False for silence; the steps are logged, too (`logging`, "lacuna").
+    - `records`: arrays, pandas, xarray, or a folder of CSV files (see `lacuna.records.read`); None for a system that
+      already has trials.
+    - `seed`: the same seed gives the same verdict. `random_state`: scikit-learn's name for the same, or a NumPy
+      generator from which a seed is drawn.
+    - `test`: names of the records that inform no choice and form the final test; by default some of each condition.
+    - `starts`: number of initial points of the base model's fit.
+    - `n_jobs`: number of processes that try explanations, -1 for one per core. By default one process with a thread
+      per core, which suits a `simulate` that releases the GIL (NumPy, numba).
+    - `executor`: an executor to use instead, from `concurrent.futures` or dask.
+    - `policy`: the rules and thresholds that decide the verdict.
+    - `suspected`: effects that are fitted whatever their score, because there is other evidence for them, such as a
+      verdict on other records; they are judged like all others.
+    - `progress`: a function called with a description of each step, or False for silence. The steps are also logged
+      (`logging`, "lacuna").
 
-    Ctrl-C during the search ends it with the best result so far. Raises MisuseError, RecordError and DeclarationError
-    before the search, naming trial and channel.
+    Ctrl-C during the search ends it with the best result so far. Before the search, raises MisuseError, RecordError or
+    DeclarationError, naming trial and channel.
     """
     _check_how(starts, n_jobs, executor, policy, progress)
     seed = _seed("seed", seed) if random_state is None else _seed("random_state", random_state)
     suspects = several(suspected, str)
-    if records is not None or not hasattr(system, "predict"):  # which is said there
+    if records is not None or not hasattr(system, "predict"):  # `with_records` reports that
         system = with_records(system, records)
     if names := several(test, str):
         system = _tested_on(system, names)
@@ -102,7 +107,7 @@ def diagnose(
 
 
 def _check_how(starts: Any, n_jobs: Any, executor: Any, policy: Any, progress: Any) -> None:
-    """Raises MisuseError where a diagnosis cannot be done like this."""
+    """Raise MisuseError if an argument of `diagnose` is invalid."""
     if not _is_whole(starts, 1):
         raise MisuseError(f"starts is {starts!r}: give a whole number, 1 or more.")
     if n_jobs is not None and not _is_whole(n_jobs, -1):
@@ -123,7 +128,7 @@ def _is_whole(given: Any, least: int) -> bool:
 
 
 def _seed(what: str, given: Any) -> int:
-    """A number, or the next one that a generator draws. Raises MisuseError."""
+    """Return the seed given as a number, or draw one from a generator. Raises MisuseError."""
     if isinstance(given, np.random.RandomState):
         return int(given.randint(2**32, dtype=np.int64))
     if isinstance(given, np.random.Generator):
@@ -134,12 +139,12 @@ def _seed(what: str, given: Any) -> int:
 
 
 def _in_steps(system: System) -> tuple[System, list[str]]:
-    """`system` with what is known of parameters that act in steps, and a sentence on each."""
+    """Return `system` with the step widths of parameters that act in steps, and a warning for each of them."""
     if not isinstance(system, FunctionSystem):
         return system, []
     try:
         grains = grains_of(system, system.trials)
-    except LacunaError:  # of the model, which the check says better
+    except LacunaError:  # an error of the model, which the check reports more clearly
         return system, []
     said = [
         f"{name} changes predictions only in steps, of about {_told_width(system, name, width):.2g}: let the model"
@@ -157,21 +162,21 @@ def _told_width(system: FunctionSystem, name: str, width: float) -> float:
 
 
 def _tested_on(system: System, names: tuple[str, ...]) -> System:
-    """`system` with these of its trials as the test."""
+    """Return `system` with these of its trials as the final test. Raises MisuseError."""
     known = {trial.name for trial in system.trials}
     for name in names:
         if name not in known:
             raise MisuseError(f"test names {name!r}, which no record is called; there are {', '.join(sorted(known))}.")
     if not isinstance(system, FunctionSystem):
-        raise MisuseError(f"test: of {type(system).__name__} the split is its own.")
+        raise MisuseError(f"test: {type(system).__name__} defines its own split.")
     return system.with_test(names)
 
 
 def _cautioned(
     found: Diagnosis, system: System, raised: Mapping[tuple[str, str], float], answer: Callable[[System], Diagnosis]
 ) -> Diagnosis:
-    """With warnings about the residual: where it is far above the floor, and where only a repeat, or the user, can tell
-    whether it is noise. What is advised is tried first: it is no advice where it would take a name away."""
+    """Add warnings about the residual: if it is far above the floor, and if only a repeat or the user can tell whether
+    it is noise. The advice is tried first, and withheld if following it would remove a named effect."""
     levels = found.search.floor.channels
     doubted = [
         f"No explanation comes near the floor of {channel}{within(experiment, (e for e, _ in levels))} ({floor:.3g}),"
@@ -197,9 +202,9 @@ def _cautioned(
 
 
 def with_records(system: System, records: Any) -> FunctionSystem:
-    """`system` with these records as its trials. Raises MisuseError, RecordError."""
+    """Return `system` with these records as its trials. Raises MisuseError, RecordError."""
     if not hasattr(system, "predict"):
-        raise MisuseError(f"diagnose(system, records): the first is a System, not {type(system).__name__}.")
+        raise MisuseError(f"diagnose(system, records): the first must be a System, not {type(system).__name__}.")
     if not isinstance(system, FunctionSystem):
         raise MisuseError(f"{type(system).__name__} already has trials: call diagnose(system) without records.")
     given = read(records)
@@ -210,7 +215,7 @@ def with_records(system: System, records: Any) -> FunctionSystem:
 
 
 def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
-    """The names that `simulate` gives its outputs, tried on one record. Raises MisuseError."""
+    """Find the names of the outputs by calling `simulate` on one record. Raises MisuseError."""
     record = stretched(table, table.record(()), ())
     run = record.payload.run if record.payload else record
     theta = {p.name: p.value for p in (*system.parameters, *system.nuisances(record))}
@@ -226,14 +231,14 @@ def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
     if len(columns) == 1:
         return columns
     raise MisuseError(
-        f"trial {record.name}: which of its columns ({listed(columns)}) does the model predict? Say System(...,"
+        f"trial {record.name}: which of its columns ({listed(columns)}) does the model predict? Give System(...,"
         " outputs=...), or return them by name, as a dict of arrays."
     )
 
 
 @contextmanager
 def _workers(n_jobs: int | None, executor: Executor | None) -> Iterator[Executor | None]:
-    """Processes that take functions from a notebook as well, each on one thread."""
+    """Yield an executor: the one given, or single-threaded processes that also accept functions from a notebook."""
     if executor is not None or n_jobs in (None, 0, 1):
         yield executor
         return

@@ -1,11 +1,11 @@
-"""What a system must declare so that it can be fitted and diagnosed.
+"""The interface between a model and the engine: what a system declares in order to be fitted and diagnosed.
 
-A `System` is a model with named parameters, a library of effects that the model may lack, and trials:
-measured records with the experiment that produced them. The engine knows nothing else; the robot is one system. For a
-plain function there is no need to derive from it: `lacuna.System` (`function_system.py`) wraps the function.
+A `System` is a model with named parameters, a library of effects that the model may lack, and trials: measured records,
+each labelled with the experiment that produced it. The engine knows nothing else; the robot is one such system. A plain
+function need not derive from it: `lacuna.System` (`function_system.py`) wraps the function.
 
-Every parameter of the base model has a plain name (`body_damping_Ns_m`), every parameter of an effect the
-name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping of both.
+A parameter of the base model has a plain name (`body_damping_Ns_m`), a parameter of an effect the name
+`<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping of both.
 """
 
 from __future__ import annotations
@@ -23,28 +23,29 @@ from lacuna.errors import DeclarationError
 Theta = Mapping[str, float]
 Channels = dict[str, np.ndarray]
 
-START_FACTORS = (0.1, 0.4, 1.2)  # of an effect's typical sizes: where fits begin
-LEARNT = "correction"  # what parameter names of learnt curves begin with, so that no effect may be called so
+START_FACTORS = (0.1, 0.4, 1.2)  # initial sizes of an effect, as multiples of its typical size
+LEARNT = "correction"  # prefix of the parameter names of learnt curves; no effect may have this name
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number to be estimated.
+    """A number to be estimated.
 
-    `value` is where the search starts; `lower` and `upper` bound it. `plausible` is the narrower range of
-    reasonable values, both ends finite (None: not known): a fit that leaves it is evidence against the model,
-    not an error. `scale` is the change of the parameter that matters, in its own unit: derivatives step by
-    a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
-    deviation of its spread. `prior_sd`: standard deviation of its prior, around `value`; None: no prior.
-    `at_least`, of the base model, names another parameter that it cannot be below. `elsewhere`: further initial values
-    for graduated fits, for a parameter whose isolating trials fit equally well at several values. `factor_of`: of a
-    nuisance, the parameters that it multiplies in its trial; its derivatives are theirs then, to the last digit, and
-    data do not seem to tell a change of all trials' factors from one of the parameters. `grain`: the least change that
-    changes a prediction, where a model counts (a delay in whole samples): derivatives step as far at least. `periodic`:
-    of an effect's own parameter, `lower` and `upper` mean the same and are no bounds (a phase). `prior_from_trials`:
-    what is known of it beforehand comes from the trials that are fitted, by a base model that knew of no effect; it
-    guides the search, and stands back where the parameters are finally told. Without a `scale` it is a tenth
-    of |value|, or of the range for a value of 0: of a nuisance, declare it.
+    `value` is the initial value of the search; `lower` and `upper` bound it. `plausible` is the narrower range of
+    reasonable values, both ends finite (None: not known); a fit that leaves it is evidence against the model, not an
+    error. `scale` is the change of the parameter that matters, in its own unit; derivatives step by a small fraction of
+    it (never relative to the value, which may be 0). For a nuisance it is the standard deviation from run to run, so
+    declare it there. The default is a tenth of |value|, or of the range if the value is 0. `prior_sd` is the standard
+    deviation of the parameter's prior around `value`; None: no prior.
+
+    `at_least`: for a parameter of the base model, the name of another one that it cannot fall below. `elsewhere`:
+    further initial values of graduated fits, for a parameter whose isolating trials fit equally well at several values.
+    `factor_of`: for a nuisance, the parameters that it multiplies in its trial; its derivatives are then computed from
+    theirs, so that the data do not falsely seem to distinguish a change of all trials' factors from a change of the
+    parameters. `grain`: the smallest change of the parameter that changes a prediction, for a model that rounds it (a
+    delay in whole samples); derivatives step at least this far. `periodic`: for an effect's own parameter, `lower` and
+    `upper` denote the same value and are not bounds (a phase). `prior_from_trials`: the prior itself was estimated from
+    the fitted trials, by a base model without effects; it guides the search and is relaxed for the final estimates.
     """
 
     name: str
@@ -82,30 +83,31 @@ class Parameter:
         object.__setattr__(self, "elsewhere", several(self.elsewhere, Real))
         for given in self.elsewhere:
             if not self.lower <= given <= self.upper:
-                raise DeclarationError(f"{self.name}: elsewhere names {given}, outside {self.lower} to {self.upper}")
+                raise DeclarationError(f"{self.name}: elsewhere has {given}, outside {self.lower} to {self.upper}")
         if self.plausible is not None and not _is_range(self.plausible):
             raise DeclarationError(f"{self.name}: plausible is {self.plausible!r}: give two numbers, the lower first")
 
     @property
     def step_scale(self) -> float:
-        """`scale`, or where none is given a tenth of |value|, or of the range for a value of 0."""
+        """`scale`; if none is given, a tenth of |value|, or of the range if the value is 0."""
         if self.scale is not None:
             return self.scale
         return 0.1 * (abs(self.value) or min(self.upper - self.lower, 1e6))
 
 
 def _is_range(given: Any) -> bool:
-    """Whether these are two finite numbers, the lower first."""
+    """Whether `given` is two finite numbers, the lower first."""
     return np.shape(given) == (2,) and all(map(_is_number, given)) and bool(given[0] < given[1])
 
 
 def _is_number(given: Any) -> bool:
-    """Whether this is a finite one."""
+    """Whether `given` is a finite number."""
     return isinstance(given, Real) and bool(-np.inf < float(given) < np.inf)
 
 
 def several(given: Any, kind: type) -> tuple[Any, ...]:
-    """What was given as some of a kind, or as one of it without brackets. Raises DeclarationError for anything else."""
+    """Return `given`, one object of type `kind` or an iterable of them, as a tuple. Raises DeclarationError if any is
+    of another type."""
     found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, kind) else (given,)
     for one in found:
         if not isinstance(one, kind):
@@ -115,25 +117,25 @@ def several(given: Any, kind: type) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class Effect:
-    """A real mechanism that the base model leaves out.
+    """A physical mechanism that the base model leaves out.
 
-    The first `sizes` of `parameters` size the effect: it vanishes if all of them equal `absent` (0
-    by default); the others only shape it. They have local names (`force_N`); in `theta` they
-    appear as `hysteresis.force_N`. A parameter's `value` is a typical magnitude. Fits start at the typical
-    sizes times each of `start_factors` (and with the other sign, where the bounds allow it). `enters` names
-    the term of the model that changes ("body spring", "pressure sensor"), `experiments` those in which it
-    can be visible (empty: all). `own` are parameters with a separate value in every trial (a phase): they
-    are fitted trial by trial, from the best of several values over their range; one without a `scale` may lie anywhere
-    in it. `frequency` names, as it is called in the effect, the
-    parameter that is a frequency, in Hz: fits start at the peaks of the residual's spectrum, since from
-    anywhere else they would not converge to it. `freed_at`: correction sites where this mechanism may act in another
-    form than its formula's; a curve there is tried before another effect is called in. `apart`: base parameters
-    without which the effect does nothing while they are as low as `Parameter.at_least` lets them; where a fit without
-    the effect made them one, fits with it begin with the two apart.
+    The first `sizes` of `parameters` set the size of the effect: it vanishes when all of them equal `absent` (0 by
+    default); the others only shape it. Parameters have local names (`force_N`) and appear in `theta` as
+    `hysteresis.force_N`. A parameter's `value` is a typical magnitude. Fits start at the typical sizes times each of
+    `start_factors` (and with the opposite sign, if the bounds allow it).
+
+    `enters` names the term of the model that changes ("body spring", "pressure sensor"). `experiments` lists those in
+    which the effect can be visible (empty: all). `own` are parameters with a separate value in every trial (a phase):
+    they are fitted trial by trial, from the best of several values over their range; one without a `scale` may lie
+    anywhere in it. `frequency` is the local name of the parameter that is a frequency, in Hz: fits start at the peaks
+    of the residual's spectrum, since from anywhere else they would not converge to it. `freed_at`: correction sites
+    where the mechanism may act in a form other than its formula's; a curve there is tried before a further effect is
+    considered. `apart`: base parameters that must lie above the limit set by their `Parameter.at_least` for the effect
+    to act at all; if a fit without the effect ended at that limit, fits with it begin with the two apart.
     """
 
     name: str
-    parameters: tuple[Parameter, ...]  # one alone needs no brackets
+    parameters: tuple[Parameter, ...]  # a single one may be given as such
     enters: str = ""
     experiments: tuple[str, ...] = ()
     equation: str = ""
@@ -156,11 +158,11 @@ class Effect:
             if one.scale is None and not _is_range((one.lower, one.upper)):
                 raise DeclarationError(f"effect {self.name}: own {one.name} needs finite bounds, or a scale")
         if not self.start_factors or not all(map(_is_number, self.start_factors)):
-            raise DeclarationError(f"effect {self.name}: `start_factors` is {self.start_factors}: give numbers")
+            raise DeclarationError(f"effect {self.name}: `start_factors` is {self.start_factors}: give finite numbers")
         if not isinstance(self.absent, Real) or np.isnan(self.absent):
             raise DeclarationError(f"effect {self.name}: `absent` is {self.absent!r}, not a number")
         if not 1 <= self.sizes <= len(self.parameters):
-            raise DeclarationError(f"effect {self.name}: `sizes` is {self.sizes}, of {len(self.parameters)} parameters")
+            raise DeclarationError(f"effect {self.name}: `sizes` is {self.sizes} for {len(self.parameters)} parameters")
         names = [p.name for p in self.parameters]
         if self.frequency is not None and self.frequency not in names:
             raise DeclarationError(
@@ -169,25 +171,26 @@ class Effect:
         for p in (*self.parameters, *self.own):
             if p.at_least is not None:
                 raise DeclarationError(
-                    f"effect {self.name}: {p.name} has `at_least`, which is for base parameters: declare the difference"
-                    f" to {p.at_least} instead"
+                    f"effect {self.name}: {p.name} has `at_least`, which is for base parameters only: declare the"
+                    f" difference to {p.at_least} instead"
                 )
 
     def full_name(self, parameter: Parameter) -> str:
+        """The name of `parameter` in `theta`: `<effect>.<parameter>`."""
         return f"{self.name}.{parameter.name}"
 
     def shows_in(self, trial: Record) -> bool:
-        """Whether it can be visible in a trial, by its experiment."""
+        """Whether the effect can be visible in the experiment of `trial`."""
         return not self.experiments or trial.experiment in self.experiments
 
     @property
     def typical(self) -> dict[str, float]:
-        """The typical value of each of its parameters, those of each trial's own included, by full names."""
+        """Typical value of each parameter by full name, including those with a separate value in every trial."""
         return {self.full_name(p): p.value for p in (*self.parameters, *self.own)}
 
     @property
     def size_names(self) -> tuple[str, ...]:
-        """The full names of the parameters that size the effect."""
+        """Full names of the parameters that set the size of the effect."""
         return tuple(self.full_name(p) for p in self.parameters[: self.sizes])
 
 
@@ -195,11 +198,11 @@ class Effect:
 class Record:
     """One measured record.
 
-    `channels` maps a channel's name to its samples, shape (n,), unit in the name; NaN where a sample is
-    missing. `time_s` has shape (n,). Trials with an equal `condition` are repeats of one another: the noise
-    floor comes from them. `session_order` is the trial's position in the day, None if not known. `inputs`: quantities
-    that were applied rather than predicted, by name: arrays of shape (n,) and single values. `payload` is for the
-    system's own use. `clock`: the name that the times had where they were read.
+    `channels` maps each channel's name, which includes the unit, to its samples, shape (n,); NaN where a sample is
+    missing. `time_s` has shape (n,). Trials with an equal `condition` are repeats of one another: the noise floor comes
+    from them. `session_order` is the trial's position in the day, None if not known. `inputs` holds, by name, the
+    quantities that were applied rather than predicted: arrays of shape (n,) and single values. `payload` is for the
+    system's own use. `clock` is the name of the source column that the times came from.
     """
 
     name: str
@@ -213,7 +216,7 @@ class Record:
     clock: str = ""
 
     def __getitem__(self, name: str) -> Any:
-        """An input, a measured channel, or `time_s`; KeyError says what there is."""
+        """Return an input, a measured channel, or `time_s`. Raises KeyError, listing what there is."""
         columns = {"time_s": self.time_s, **self.channels, **self.inputs}
         if name not in columns:
             raise KeyError(f"{name}: record {self.name} has {', '.join(columns)}")
@@ -224,7 +227,7 @@ class Record:
 
 
 def groups_of_repeats(trials: Sequence[Record]) -> list[list[Record]]:
-    """Trials of the same experiment and condition, in the order in which these first appear."""
+    """Group trials by experiment and condition, in order of first appearance."""
     groups: dict[Hashable, list[Record]] = {}
     for trial in trials:
         groups.setdefault((trial.experiment, trial.condition), []).append(trial)
@@ -232,7 +235,7 @@ def groups_of_repeats(trials: Sequence[Record]) -> list[list[Record]]:
 
 
 def by_channel(trials: Iterable[Record]) -> dict[tuple[str, str], list[Record]]:
-    """Trials by experiment and channel that they have, in the order in which these first appear."""
+    """Trials that have each channel, by (experiment, channel), in order of first appearance."""
     found: dict[tuple[str, str], list[Record]] = defaultdict(list)
     for trial in trials:
         for channel in trial.channels:
@@ -241,8 +244,8 @@ def by_channel(trials: Iterable[Record]) -> dict[tuple[str, str], list[Record]]:
 
 
 def middle_conditions(trials: Sequence[Record]) -> tuple[tuple[str, Hashable], ...]:
-    """Of each experiment with three repeated conditions or more the one between the others, by the mean of what was
-    measured first: what is never fitted where nobody has said what should be."""
+    """The middle condition of each experiment that has three or more repeated conditions, sorted by the mean of their
+    first channel: the default for conditions that are never fitted."""
     means: dict[str, dict[Hashable, float]] = defaultdict(dict)
     for members in groups_of_repeats(trials):
         if len(members) > 1:
@@ -254,12 +257,12 @@ def middle_conditions(trials: Sequence[Record]) -> tuple[tuple[str, Hashable], .
 
 @dataclass(frozen=True)
 class CorrectionSite:
-    """A term of an equation that may be replaced by "the model's term plus a curve learnt from data".
+    """A term of an equation to which a curve learnt from data may be added.
 
-    The curve is a function of `variable` between `lower` and `upper` (constant beyond), a spline through as many
-    `knots`; one curve for each of `rows`, where it differs by direction, actuator or the like. `scale` is the change of
-    the term that matters, in `unit`. Example: site `body_spring`, term "force of the body's spring", variable
-    "displacement (m)", unit N.
+    The curve is a spline in `variable` with `knots` knots between `lower` and `upper`, constant beyond; one curve for
+    each of `rows` if it differs by direction, actuator or the like. `scale` is the change of the term that matters, in
+    `unit`. Empty `experiments`: the curve acts in all. Example: site `body_spring`, term "force of the body's spring",
+    variable "displacement (m)", unit N.
     """
 
     name: str
@@ -277,7 +280,7 @@ class CorrectionSite:
         for each in ("rows", "experiments"):
             object.__setattr__(self, each, several(getattr(self, each), str))
         if not _is_range((self.lower, self.upper)):
-            raise DeclarationError(f"curve {self.name}: {self.lower!r} to {self.upper!r} is no finite range")
+            raise DeclarationError(f"curve {self.name}: {self.lower!r} to {self.upper!r} is not a finite range")
         if not (_is_number(self.scale) and self.scale > 0.0):
             raise DeclarationError(f"curve {self.name}: scale is {self.scale!r}: give a number above 0")
         if not self.rows or not isinstance(self.knots, Integral) or self.knots < 2:
@@ -286,8 +289,8 @@ class CorrectionSite:
 
 @dataclass(frozen=True)
 class Correction:
-    """A learnt curve at a site: `table`, shape (rows of the site, n), holds its values on a uniform grid from the
-    site's lower to its upper end. Interpolate linearly."""
+    """The curve learnt at a site. `table`, shape (rows of the site, n), holds its values on a uniform grid from the
+    site's lower to its upper end, to be interpolated linearly."""
 
     site: str
     table: np.ndarray
@@ -295,8 +298,8 @@ class Correction:
 
 @dataclass(frozen=True)
 class CandidateExperiment:
-    """An experiment that could be run next: `trial` is passed to `predict`; its channels hold NaN, one for
-    each sample that would be taken. `settings` is what an operator or a rig needs to run it."""
+    """An experiment that could be run next. `trial` is passed to `predict`; its channels hold a NaN for each sample
+    that would be taken. `settings` is what an operator or a rig needs to run it."""
 
     experiment: str
     settings: Mapping[str, Any]
@@ -304,14 +307,15 @@ class CandidateExperiment:
 
 
 class System(Protocol):
-    """Derive from this class and define the first five members; the rest have neutral defaults.
+    """The model as the engine sees it. Derive from this class and define the first five members (`name` to `predict`);
+    the rest have neutral defaults.
 
-    `predict` is called from several threads at once: it must not change the system, and is fast when it
-    releases the GIL.
+    `predict` is called from several threads at once, so it must not change the system; it is fast if it releases the
+    GIL.
     """
 
     name: str
-    parameters: tuple[Parameter, ...]  # of the base model, those that are to be fitted
+    parameters: tuple[Parameter, ...]  # the fitted parameters of the base model
     effects: Mapping[str, Effect]
     trials: tuple[Record, ...]
 
@@ -324,12 +328,12 @@ class System(Protocol):
         coarse: bool = False,
         corrections: Sequence[Correction] = (),
     ) -> Channels:
-        """Free run of a trial (from its initial state and inputs, never from measured outputs).
+        """Simulate a trial as a free run, from its initial state and inputs, never from measured outputs.
 
-        `theta` holds every base parameter, those of the active `effects`, and this trial's nuisances under
-        their own names. Returns the same channels and shapes as `trial.channels`; NaN where the simulation
-        failed. `coarse` allows a cheaper simulation, good enough for derivatives; otherwise the
-        integrator's error must be well under the noise, or it will be taken for structure.
+        `theta` holds every base parameter, those of the active `effects`, and this trial's nuisances under their own
+        names. Returns the channels of `trial.channels` in the same shapes; NaN where the simulation failed. `coarse`
+        allows a cheaper simulation that is good enough for derivatives; otherwise the integrator's error must be well
+        below the noise, or it will be mistaken for structure.
         """
         ...
 
@@ -343,16 +347,16 @@ class System(Protocol):
         corrections: Sequence[Sequence[Correction]] = (),
         alike: bool = False,
     ) -> list[Channels]:
-        """`predict` for each of `thetas`, with its own `corrections` if any. Override it, or `predict_trials`, if
-        simulating many at once is cheaper. `alike`: all are near the first and are to be compared with it, as for
-        derivatives; so let errors of the integrator be alike, too, if possible."""
+        """Predict a trial for each of `thetas`, each with its own `corrections` if any. Override it, or
+        `predict_trials`, if simulating many at once is cheaper. `alike`: all are close to the first and will be
+        compared with it, as for derivatives, so integrator errors should cancel as far as possible."""
         trials = [trial] * len(thetas)
         return self.predict_trials(thetas, effects, trials, coarse=coarse, corrections=corrections, alike=alike)
 
-    at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
-    forks: bool = False  # whether a fork of this process may simulate: not if it has threads or devices of its own
-    tells_of_all: bool = False  # whether parameters are told from a fit to every record, those too that judged
-    # whether each run draws its own nuisances, so that repeats share nothing of them (`nuisances.py`)
+    at_once: int = 1  # number of trials that `predict_trials` simulates at little more than the cost of one
+    forks: bool = False  # whether a fork of this process may simulate; False if it has threads or devices of its own
+    tells_of_all: bool = False  # whether reported parameters come from a fit to every record, held-out ones included
+    # whether nuisances vary independently from run to run, so that repeats have none in common (`nuisances.py`)
     nuisances_per_run: bool = False
 
     def predict_trials(
@@ -365,8 +369,8 @@ class System(Protocol):
         corrections: Sequence[Sequence[Correction]] = (),
         alike: bool = False,
     ) -> list[Channels]:
-        """`predict` for one of `thetas` in each of `trials`. Override it, and set `at_once`, if simulating several
-        trials of one experiment side by side is cheaper. `alike`: as in `predict_many`."""
+        """Predict each of `trials` with the corresponding one of `thetas`. Override it, and set `at_once`, if
+        simulating several trials of one experiment side by side is cheaper. `alike`: as in `predict_many`."""
         corrections = corrections or [()] * len(thetas)
         return [
             self.predict(theta, effects, trial, coarse=coarse, corrections=learnt)
@@ -374,60 +378,62 @@ class System(Protocol):
         ]
 
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
-        """Named quantities, shape (n,) each, on which a residual may depend: "displacement", "direction of
+        """Quantities on which a residual may depend, by name, each of shape (n,): "displacement", "direction of
         motion", "velocity", "command", "time since the last switch", "position in the pipe" ..."""
         return {}
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
-        """What varies from run to run in this trial: fitted for each trial, with a Gaussian prior of mean
+        """Quantities of this trial that vary from run to run: fitted for each trial, with a Gaussian prior of mean
         `value` and standard deviation `scale`."""
         return ()
 
     def matters(self, parameter: str, trial: Record) -> bool:
-        """False if this base parameter cannot change this trial: saves a simulation per derivative."""
+        """Whether a base parameter can change a trial; False saves a simulation per derivative."""
         return True
 
     def isolates(self, trial: Record) -> bool:
-        """Whether a trial isolates a few parameters. Graduated fits start with such trials: in one where everything
-        acts together, and small errors accumulate, they would end in a wrong minimum."""
+        """Whether a trial isolates a few parameters. Graduated fits start with such trials; starting with trials in
+        which everything acts together and small errors accumulate, they would end in a local optimum."""
         return True
 
     def spare(self) -> Collection[tuple[str, Hashable]]:
-        """(experiment, condition) of trials that are never fitted: explanations are judged by how well they predict
-        them. Choose conditions between others, so that the fitted ones still determine every parameter."""
+        """(experiment, condition) of the trials that are never fitted: explanations are judged by how well they predict
+        them. Choose conditions that lie between others, so that the fitted ones still determine every parameter."""
         return ()
 
     def test(self) -> Collection[str]:
-        """Names of the trials that inform no choice and are the test. Empty: some of each condition."""
+        """Names of the trials that inform no choice and form the final test. Empty: some of each condition."""
         return ()
 
     def accuracy(self, experiment: str, channel: str) -> float:
-        """RMS error, in the channel's unit, up to which a prediction is good enough whatever the noise is. 0: only the
+        """RMS error, in the channel's unit, up to which a prediction is good enough, whatever the noise. 0: only the
         noise counts."""
         return 0.0
 
     def sensor_noise(self, experiment: str, channel: str) -> float:
-        """Standard deviation of the instrument alone, in the channel's unit: the floor's lower bound.
-        0: not known."""
+        """Standard deviation of the instrument alone, in the channel's unit: a lower bound of the noise floor. 0: not
+        known."""
         return 0.0
 
     def told(self, parameter: str, value: float) -> float:
-        """A parameter's fitted value in the user's terms, if the two differ (a logarithm)."""
+        """Convert a fitted value of a parameter to the user's parametrization, if the two differ (a logarithm)."""
         return value
 
     def times_slope(self, parameter: str, value: float) -> float:
-        """The derivative of a parameter's fitted value by the logarithm of what is told of it: the value itself, if the
-        two do not differ."""
+        """Derivative of the fitted value with respect to the logarithm of the parameter as the user declared it: the
+        value itself, if the two do not differ."""
         return value
 
     def noise_time_s(self, experiment: str, channel: str) -> float:
-        """Correlation time of the noise, if there are no repeats to show it. 0: only the fast noise of a record counts
-        as noise, anything slower as structure."""
+        """Correlation time of the noise, in s, used if there are no repeats to show it. 0: only the fast noise of a
+        record counts as noise, anything slower as structure."""
         return 0.0
 
     @property
     def correction_sites(self) -> Mapping[str, CorrectionSite]:
+        """Terms at which a curve may be learnt if no effect explains the residual, by name."""
         return {}
 
     def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
+        """Experiments that could be run next, among which the most informative is recommended."""
         return ()

@@ -1,4 +1,4 @@
-"""A verdict as a person reads it: a line, a screen of text, a page, a figure, and the completed model to call."""
+"""The result as the user sees it: text, a page, figures, tables, and the completed model as a function."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ from lacuna.values import Values
 class CompletedModel:
     """The completed model, called like `simulate`: `model(record)` or `model(record, theta)`.
 
-    `record` is anything that `diagnose` takes as one record, `theta` a mapping of values that differ from the fitted
-    ones, `model.theta`. What differs from run to run (a nuisance) has its expected value, if `theta` does not say
-    otherwise. Returns what `simulate` returns, of a window or a segment its own samples.
+    `record` is anything that `diagnose` accepts as one record. `theta` maps parameters to values that replace the
+    fitted ones, which are in `model.theta`. Nuisances have their expected values unless `theta` gives others. Returns
+    what `simulate` returns; for a segment of a longer record, only the segment's own samples. Raises MisuseError for
+    an unknown, fixed or tied parameter.
     """
 
     def __init__(self, system: System, fitted: Fit):
@@ -53,7 +54,7 @@ class CompletedModel:
         system.held.fill(values)
         try:
             return system.simulated(record, values)
-        except KeyError as error:  # of a record, or of the model's own
+        except KeyError as error:  # raised by the record or by the model itself
             raise MisuseError(f"the model finds no {error.args[0]}.") from error
 
     def __repr__(self) -> str:
@@ -61,10 +62,10 @@ class CompletedModel:
 
 
 def _one(record: Any, outputs: tuple[str, ...]) -> Record:
-    """A record, whichever form it has; outputs that it lacks have yet to be predicted."""
+    """Read one record in any form; it need not contain the outputs, which are yet to be predicted."""
     given = read(record)
     if len(given) != 1:
-        raise MisuseError(f"the model is called with one record, not {len(given)}: call it with each of them.")
+        raise MisuseError(f"the model is called with one record, not {len(given)}: call it once for each.")
     found = given[0]
     if isinstance(found, Record):
         return found
@@ -72,14 +73,19 @@ def _one(record: Any, outputs: tuple[str, ...]) -> Record:
 
 
 class Verdict:
-    """The engine's result. `verdict`: "none", "identified" or "unexplained"; `effects`: the effects named, with sizes,
-    intervals and weights (`probability`); `error`: before, after and of the floor, RMS in units of the noise, on
-    records that were not fitted; `warnings`; `theta`: the completed model's parameters; `model`: that model, to call;
-    `nuisances`: by record, what was fitted to each. For a system of a function these three are fitted to every record,
-    once the errors are known.
+    """The result of a diagnosis.
 
-    `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws, `to_frame` makes tables of it, `save`
-    keeps it (`lacuna.load`). `record` is all of it in plain types for JSON, `diagnosis` the engine's complete result.
+    - `verdict`: "none", "identified" or "unexplained".
+    - `effects`: the named effects, with sizes, intervals and weights (`probability`).
+    - `error`: RMS error on held-out records, in units of the noise, as a dict of "before", "after" and "floor".
+    - `warnings`: what to bear in mind, as sentences.
+    - `theta`, `model`, `nuisances`: the completed model's parameters; that model as a function (`CompletedModel`); the
+      nuisances fitted to each record. For a model given as a function, all three come from a fit to every record, made
+      after the errors were computed.
+    - `record`: everything in plain types, for JSON. `diagnosis`: the engine's complete result.
+
+    `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws a figure, `to_frame` returns tables,
+    and `save` writes a file that `lacuna.load` reads.
     """
 
     def __init__(self, system: System, diagnosis: Diagnosis):
@@ -101,34 +107,38 @@ class Verdict:
         return screen_of(self.system.name, self.record, self.diagnosis)
 
     def report(self, path: str | Path) -> Path:
-        """Write a page (HTML, self-contained, no script) with the evidence; return its path."""
+        """Write a page with the evidence (self-contained HTML without scripts) and return its path."""
         from lacuna.report.diagnosis import diagnosis_page
         from lacuna.report.page import render
 
         return _written(path, render(diagnosis_page(self.system.name, self.record, self.diagnosis)))
 
     def to_frame(self, what: str = "parameters") -> Any:
-        """A pandas DataFrame: the `parameters` of the completed model with their 90 % intervals (where a curve was
-        learnt: the intervals of the explanation without it, so that a value may lie outside), or the explanations
-        `compared`: by how much log-likelihood each is worse than the chosen one where nothing was fitted, the standard
-        error of that, and its weight. Raises MisuseError for another word."""
+        """Return a pandas DataFrame of the "parameters" of the completed model or of the explanations "compared".
+
+        "parameters": values and 90 % intervals. If a curve was learnt, the intervals are those of the explanation
+        without it, so a value may lie outside. "compared": by how much held-out log-likelihood each explanation is
+        worse than the chosen one, the standard error of that difference, and the explanation's weight. Raises
+        MisuseError for any other `what`.
+        """
         return _frame(self.record, self.theta, what)
 
     def save(self, path: str | Path) -> Path:
-        """Write the verdict as JSON, to be read again with `lacuna.load`; return its path. The completed model is a
-        function of yours with the values in `theta`."""
+        """Write the verdict as JSON, to be read with `lacuna.load`, and return its path. The completed model itself is
+        not saved: it is your function with the values in `theta`."""
         kept = {"system": self.system.name, "record": self.record, "theta": dict(self.theta), "text": str(self)}
         return _written(path, json.dumps(kept, indent=1, default=float))
 
     def plot(self) -> Any:
-        """A Matplotlib figure: error before and after, what was tried, and the worst predicted held-out records."""
+        """Return a Matplotlib figure: errors before and after, explanations tried, and the worst predicted held-out
+        records."""
         from lacuna.report.figures import overview
 
         return overview(self.record, self.diagnosis)
 
 
 class SavedVerdict:
-    """What `Verdict.save` kept: `verdict`, `record`, `theta`, `warnings`, `error`, and the screen of text."""
+    """A verdict read by `lacuna.load`: `verdict`, `record`, `theta`, `warnings`, `error`, and the screen of text."""
 
     def __init__(self, kept: Mapping[str, Any]):
         self.record, self.theta, self._text = kept["record"], Values(kept["theta"]), kept["text"]
@@ -144,21 +154,21 @@ class SavedVerdict:
         return f"<{', '.join([self.verdict, *(e['name'] for e in self.record['effects'])])}>"
 
     def to_frame(self, what: str = "parameters") -> Any:
-        """As `Verdict.to_frame`."""
+        """Return a pandas DataFrame, as `Verdict.to_frame` does."""
         return _frame(self.record, self.theta, what)
 
 
 def load(path: str | Path) -> SavedVerdict:
-    """A verdict as `Verdict.save` wrote it. Raises MisuseError where the file is none."""
+    """Read a verdict that `Verdict.save` wrote. Raises MisuseError for any other file."""
     try:
         kept = json.loads(Path(path).read_text(encoding="utf-8"))
         return SavedVerdict(kept)
     except (ValueError, KeyError, TypeError) as error:
-        raise MisuseError(f"{path} is no verdict that `Verdict.save` wrote.") from error
+        raise MisuseError(f"{path} is not a verdict written by `Verdict.save`.") from error
 
 
 def _written(path: str | Path, text: str) -> Path:
-    """`path`, once all of the text is there."""
+    """Write `text` to `path` atomically and return the path."""
     path = Path(path)
     unfinished = path.with_name(path.name + ".unfinished")
     unfinished.write_text(text, encoding="utf-8")
@@ -173,7 +183,7 @@ def _frame(record: Mapping[str, Any], theta: Mapping[str, float], what: str) -> 
         rows = [one | {"effects": " + ".join(one["effects"]) or "base model"} for one in record["compared"]]
         return pandas.DataFrame(rows, columns=["effects", "worse_by", "standard_error", "weight"])
     if what != "parameters":
-        raise MisuseError(f'to_frame makes "parameters" or "compared", not {what!r}.')
+        raise MisuseError(f'to_frame takes "parameters" or "compared", not {what!r}.')
     known = {name: one["interval_90"] for name, one in record["base_parameters"].items()}
     for effect in record["effects"]:
         known |= {f"{effect['name']}.{name}": ends for name, ends in effect["interval_90"].items()}
@@ -192,7 +202,7 @@ def _nuisances(fitted: Fit) -> dict[str, dict[str, float]]:
 
 
 def told(system: System, diagnosis: Diagnosis) -> Diagnosis:
-    """`diagnosis` with its sizes, values and intervals in the person's own parameters."""
+    """Return `diagnosis` with all sizes, values and intervals converted to the user's own parameters."""
     if not isinstance(system, FunctionSystem):
         return diagnosis
     effects = []

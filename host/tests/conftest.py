@@ -1,4 +1,4 @@
-"""What holds for every test: properties are checked on the same examples every time, and never against the clock."""
+"""Settings and fixtures of all tests. Hypothesis checks the same examples every time, without deadlines."""
 
 import os
 import random
@@ -15,14 +15,14 @@ from harness.browser import find_browser, open_browser
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 
-# A shell starts what it runs in the background deaf to Ctrl-C, and so would be all that the tests start.
+# A shell makes its background jobs ignore Ctrl-C, and all processes that the tests start would inherit that.
 if threading.current_thread() is threading.main_thread():
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
 def browser():
-    """A browser for the tests of pages; without one they are skipped, and say so."""
+    """A browser for the tests of pages, which are skipped with a reason if there is none."""
     pytest.importorskip("playwright", reason="playwright is not installed: see host/requirements.in")
     if find_browser() is None:
         pytest.skip("no Chromium: install Debian's `chromium` (tools/system-packages.sh browser), or set BIFA_CHROMIUM")
@@ -32,7 +32,7 @@ def browser():
 
 @pytest.fixture
 def signals_as_in_a_terminal():
-    """A shell ignores some on behalf of what it starts in the background, and so would what the tests start."""
+    """Default handlers of the signals that a shell's background jobs may ignore, for the processes under test."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGUSR2)
     before = {
         number: signal.signal(number, signal.default_int_handler if number is signal.SIGINT else signal.SIG_DFL)
@@ -74,18 +74,18 @@ def gait(tmp_path) -> str:
 
 @pytest.fixture
 def figure(record_property) -> Callable[[str], None]:
-    """figure("text"): a line shown at the end of the run, whichever process the test ran in."""
+    """figure("text"): show a line at the end of the run, whichever process the test runs in."""
     return partial(record_property, "figure")
 
 
 def pytest_addoption(parser) -> None:
-    parser.addoption("--quick", action="store_true", help="leave out what is slow or runs in real time")
+    parser.addoption("--quick", action="store_true", help="leave out slow tests and those in real time")
 
 
 def pytest_collection_modifyitems(config, items) -> None:
-    """Tests in real time get a second chance. In another order where BIFA_TEST_ORDER is set, to a seed: the files
-    shuffled, and the tests in each; else the slow ones first, so that none is begun when all others are done. With
-    --quick the slow ones and those in real time are left out."""
+    """Rerun failed real-time tests once. If BIFA_TEST_ORDER is set to a seed, shuffle the files and the tests in each;
+    otherwise run slow tests first, so that none starts when all others are done. With --quick, leave out slow tests and
+    those in real time."""
     if config.getoption("quick"):
         left_out = [item for item in items if any(map(item.get_closest_marker, ("slow", "real_time")))]
         config.hook.pytest_deselected(items=left_out)
@@ -102,7 +102,7 @@ def pytest_collection_modifyitems(config, items) -> None:
 
 
 def pytest_terminal_summary(terminalreporter) -> None:
-    """Show the figures that tests have measured."""
+    """Show the figures that the tests measured."""
     for report in terminalreporter.getreports("passed") + terminalreporter.getreports("failed"):
         for name, value in report.user_properties:
             if name == "figure" and report.when == "call":

@@ -1,4 +1,4 @@
-"""`import bifa` offers what a notebook needs, and waits only for what is used."""
+"""`import bifa` offers what a notebook needs, and imports its dependencies only when they are used."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""A dask cluster over TLS: certificates of one's own authority, or nothing."""
+"""A dask cluster over TLS accepts only certificates of one's own authority."""
 
 import subprocess
 from pathlib import Path
@@ -11,7 +11,7 @@ distributed = pytest.importorskip("distributed")
 
 
 def authority(folder: Path, name: str) -> Tls:
-    """An authority of that name, with one certificate for everybody (made by openssl)."""
+    """Certificate authority of that name, with one certificate shared by all parties (made by openssl)."""
     files = {part: folder / f"{name}.{part}" for part in ("ca", "cert", "key")}
     openssl = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", f"/CN={name}"]
     subprocess.run([*openssl, "-keyout", files["key"], "-out", files["cert"]], check=True, capture_output=True)
@@ -57,7 +57,7 @@ def test_no_certificate_is_refused(address):
 
 
 def test_certificates_do_not_travel_in_the_clear(ours):
-    with pytest.raises(ClusterError, match="begins with tls://"), cluster("tcp://127.0.0.1:8786", ours):
+    with pytest.raises(ClusterError, match="need an address tls://"), cluster("tcp://127.0.0.1:8786", ours):
         pass
 
 

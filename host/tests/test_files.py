@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, and their places checked before any work."""
+"""Files are written whole or not at all, and output paths are checked before any work."""
 
 import errno
 from pathlib import Path
@@ -86,7 +86,7 @@ def test_what_a_command_reads_and_what_was_measured_are_never_its_target(tmp_pat
     check_targets(data / "model.toml", inputs=(model,))
 
 
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder here that refuses files even to root")
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder on this system refuses files even to root")
 def test_a_folder_that_refuses_files_is_known_before_the_work():
     with pytest.raises(TargetError, match=r"x\.toml cannot be written .*; choose another place"):
         check_targets(Path("/proc/x.toml"))

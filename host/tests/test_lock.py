@@ -1,4 +1,4 @@
-"""One program at a time in a folder, and who it is."""
+"""Only one program at a time works in a folder, and the others are told which."""
 
 import json
 import os
@@ -52,7 +52,7 @@ def test_what_a_killed_program_has_left_is_stale(tmp_path):
 
 
 def test_one_of_many_gets_it_and_each_in_turn(tmp_path):
-    """Programs that take it and let go of it all the time: never two inside at once, none of them lost."""
+    """Programs that acquire and release the lock continually never hold it at once, and all of them finish."""
     code = """
 import os, sys, time
 from bifa.lock import LockedError, locked

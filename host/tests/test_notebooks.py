@@ -1,4 +1,4 @@
-"""The notebooks run as they stand, what they assert at their ends holds, and they are kept with what they give."""
+"""The notebooks run unchanged, their closing assertions hold, and they are committed with their outputs."""
 
 import re
 from itertools import count
@@ -8,7 +8,7 @@ from nbclient.exceptions import CellExecutionError
 
 from harness.notebooks import EMPS, NAMES, NOTEBOOKS, read, run, shape
 
-LARGEST = 400_000  # bytes, with its pictures
+LARGEST = 400_000  # bytes, with pictures
 by_name = pytest.mark.parametrize("name", NAMES)
 
 
@@ -44,7 +44,7 @@ def test_it_is_small_names_its_front_end_and_no_place_of_the_computer_that_it_ra
 
 
 def test_the_robot_is_optimized_to_the_fastest_that_is_printed():
-    """As it is kept; the run asserts the same."""
+    """The optimized speed is the highest printed in the committed notebook; running it asserts the same."""
     text = (NOTEBOOKS / "robot.ipynb").read_text()
     speeds = [float(speed) for speed in re.findall(r"(\d+\.\d) mm/s", text)]
     (optimised,) = re.findall(r"(\d+\.\d) mm/s, [\d.]+ times as fast", text)

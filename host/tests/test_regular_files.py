@@ -1,4 +1,4 @@
-"""Files that people name are read if they are files: a pipe may never end, and a device has no end."""
+"""Only regular files are read: a pipe may never end, and a device has no end."""
 
 import os
 
@@ -13,7 +13,7 @@ from bifa.robot import load_model
 from bifa.robot.gait import GaitError, read_gait_file
 from bifa.robot.model_file import ModelFileError
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes among its files")
+pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 
 
 def a_pipe(path):

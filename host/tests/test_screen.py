@@ -1,4 +1,4 @@
-"""What commands print: text from files is text."""
+"""Commands print text from files literally, never as markup."""
 
 import io
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What `import bifa` and `import lacuna` offer has types, for whoever checks the types of what they write."""
+"""Everything that `import bifa` and `import lacuna` offer is typed, so that users can type-check their own code."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""On Windows: what POSIX alone has is missing, and redirected output is in an old code page (harness.without_posix)."""
+"""As on Windows: POSIX-only modules are missing, redirected output uses a legacy code page (harness.without_posix)."""
 
 import os
 import subprocess
@@ -27,7 +27,7 @@ ROOMS = [
 
 @pytest.fixture
 def elsewhere():
-    """A program there: its outputs, encoded as what Windows redirects, and its exit status."""
+    """Run a module in that environment; its output is encoded as Windows encodes redirected output."""
 
     def run(*arguments: str | Path) -> subprocess.CompletedProcess[bytes]:
         command = [sys.executable, "-m", *map(str, arguments)]

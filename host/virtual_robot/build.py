@@ -23,7 +23,7 @@ _COMPILE += ["-Wall", "-Wextra", "-Wno-missing-field-initializers"]
 
 @dataclass(frozen=True)
 class Part:
-    """One C part: its folder, the header that is its whole interface, and what it is linked with."""
+    """One C part: its folder, the header that declares its interface, and the libraries it is linked with."""
 
     name: str
     header: str
@@ -62,7 +62,7 @@ PARTS = (
 
 
 def declarations(header: Path) -> str:
-    """The header as cffi reads it: no comments, no preprocessor lines."""
+    """The header without comments and preprocessor lines, as cffi needs it."""
     text = re.sub(r"//[^\n]*", "", header.read_text(encoding="utf-8"))
     return "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("#"))
 
@@ -83,7 +83,7 @@ def compile_part(part: Part, target: Path) -> None:
         built = Path(ffi.compile(tmpdir=scratch, verbose=False))
         new = target.with_suffix(".new")
         new.write_bytes(built.read_bytes())
-        new.replace(target)  # at once: a running process keeps the object it has loaded
+        new.replace(target)  # atomic: a running process keeps the object that it has loaded
 
 
 def main(names: list[str]) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing a data set in the contract's format: complete or not at all, with the digits that the instruments give."""
+"""Write a data set in the contract's format, complete or not at all, with as many digits as the instruments give."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import tomli_w
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """A scratch folder beside `out` that takes its name when all is in it, and goes away if anything fails."""
+    """A scratch folder beside `out`, renamed to `out` once the block has succeeded and removed if it raises."""
     out.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}-"))
     try:
@@ -34,7 +34,7 @@ def write_head(folder: Path, name: str, known: Mapping[str, float], entries: Ite
 
 
 def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
-    """One header line, then rows."""
+    """Write one header line, then the rows."""
     digits = [0 if name.startswith("command") else 3 if name == "force_N" else 4 for name in columns]
     line = ",".join(f"%.{n}f" for n in digits) + "\n"
     rows = np.column_stack(list(columns.values()))

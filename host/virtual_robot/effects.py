@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can be wrong with the bench: one entry an effect. The C plant realises them (plant/src).
+"""The effects that the virtual bench can have, one entry each; the C plant (plant/src) implements them.
 
-An effect's parameter `p` is the plant's parameter `<effect>_p`. `size` is what the lab found modest; a drawn
-effect has a multiple of it. `drawn` are further parameters and the range from which each is taken.
+Parameter `p` of an effect is the plant's parameter `<effect>_p`. `sizes` are what the lab calls modest; a drawn effect
+has a multiple of them. `drawn` are the remaining parameters, with the range that each is drawn from.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from virtual_robot.plant.parameters import PlantParameterError
 
 @dataclass(frozen=True)
 class Effect:
-    """`sizes` scale together; `signed` effects are drawn with either sign; `drawn` do not scale."""
+    """`sizes` are scaled together, `drawn` are not scaled; `signed` effects are drawn with either sign."""
 
     name: str
     sizes: Mapping[str, float]
@@ -25,13 +25,13 @@ class Effect:
     signed: bool = False
 
     def at(self, factor: float, random: np.random.Generator) -> dict[str, float]:
-        """The effect's parameters at `factor` times its size, the rest drawn."""
+        """Parameters at `factor` times the modest size; the others are drawn."""
         sign = random.choice((-1.0, 1.0)) if self.signed else 1.0
         values = {name: sign * factor * size for name, size in self.sizes.items()}
         return values | {name: float(random.uniform(*span)) for name, span in self.drawn.items()}
 
     def defaults(self) -> dict[str, float]:
-        """The effect's parameters at its size, the rest in the middle of their ranges."""
+        """Parameters at the modest size, the others in the middle of their ranges."""
         return dict(self.sizes) | {name: 0.5 * (low + high) for name, (low, high) in self.drawn.items()}
 
 
@@ -75,7 +75,7 @@ EFFECTS = {effect.name: effect for effect in (*_IN_LIBRARY, *_IN_NONE)}
 
 
 def plant_parameters(effects: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    """`{"hysteresis": {"force_N": 4.0}}` as the plant's parameters; what is not given takes its usual value."""
+    """`{"hysteresis": {"force_N": 4.0}}` as plant parameters; those not given take their default."""
     numbers: dict[str, float] = {}
     for name, given in effects.items():
         if name not in EFFECTS:

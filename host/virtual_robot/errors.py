@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can go wrong on the virtual bench, each saying what to do; and the check of a file's place, before the work."""
+"""Errors of the virtual bench, whose messages say what to do, and a check that a file can be written."""
 
 import os
 from pathlib import Path
 
 
 class VirtualRobotError(Exception):
-    """The root of every error that the virtual bench expects."""
+    """Base class of the errors that the virtual bench expects."""
 
-    for_the_user = True  # its text says all; a host that does not know this class may show it as it is
+    for_the_user = True  # the message is complete: a host that does not know this class may show it alone
 
 
 class NotBuiltError(VirtualRobotError):
@@ -29,11 +29,11 @@ class FirmwareError(VirtualRobotError):
 
 
 class EventsGoneError(VirtualRobotError):
-    """The log of events has dropped what was asked for."""
+    """The event log no longer holds the requested event."""
 
     def __init__(self, first: int) -> None:
         super().__init__(
-            f"event {first} is no longer in the log, which keeps the last half a million: read it more often"
+            f"event {first} is no longer in the log, which keeps the last half million; read the log more often"
         )
 
 
@@ -42,7 +42,7 @@ class PortClosedError(ConnectionError):
 
 
 def check_place(file: Path, what: str) -> None:
-    """Before the work: raise VirtualRobotError unless the folder of `file`, called `what`, can be written in."""
+    """Raise VirtualRobotError unless the folder of `file` is writable; `what` names the file in the message."""
     folder = file.absolute().parent
     if not folder.is_dir():
         raise VirtualRobotError(f"the folder of {what} {file} does not exist; create it first")

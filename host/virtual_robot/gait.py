@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Valve commands of a settled gait on a sampled time line (paper, section V.A)."""
+"""Valve commands of a settled gait, switching by switching or sampled (paper, section V.A)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Gait:
     duty_tail: float
 
     def switches(self, duration_s: float) -> list[tuple[float, str, str]]:
-        """(time_s, chamber, "positive" | "vacuum") in the order of time; the body's phase is 0 at time 0."""
+        """(time_s, chamber, "positive" | "vacuum") in time order; the body's phase is 0 at time 0."""
         rows = []
         all_ahead = (0.0, self.psi12_deg / 360.0, self.psi13_deg / 360.0)
         duties = (self.duty_body, self.duty_head, self.duty_tail)
@@ -36,7 +36,7 @@ class Gait:
         return sorted((row for row in rows if 0.0 <= row[0] <= duration_s), key=lambda row: row[0])
 
     def commands(self, time_s: np.ndarray) -> np.ndarray:
-        """1 = positive, 0 = vacuum, shape (n, 3) for body, head, tail, as a recorder at `time_s` sees them."""
+        """Commands as recorded at `time_s`: 1 = positive, 0 = vacuum, shape (n, 3) for body, head, tail."""
         seen = np.zeros((len(time_s), 3), int)
         for time, chamber, state in self.switches(float(time_s[-1]) + 1.0):
             seen[time_s >= time - 1e-9, CHAMBERS.index(chamber)] = state == "positive"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bench on a pseudo-terminal in real time, for people and for any serial program.
+"""Serve the bench on a pseudo-terminal in real time, for people and for any serial program.
 
-A pty has no DTR line. So, as opening an Uno's port resets it, the board is reset when the pty is opened, which the
-kernel shows by no longer reporting the other side as hung up.
+Opening the port of a real Uno resets it through DTR, a line that a pty does not have. So the board is reset when the
+pty is opened, which is when the kernel stops reporting the other side as hung up.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ def serve(
     link: Path | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Offer the bench on a pty in real time until `stop()` or KeyboardInterrupt. `on_ready` gets the pty's path,
-    `on_status` a dict four times a second; `link` is a symbolic link kept to the pty meanwhile."""
+    """Serve the bench on a pty in real time until `stop()` or KeyboardInterrupt. `on_ready` gets the pty's path,
+    `on_status` a dict four times a second; `link` is a symbolic link to the pty, removed at the end."""
     if not hasattr(os, "openpty"):
         raise VirtualRobotError("a pseudo-terminal needs Linux or macOS")
-    import tty  # there is none on Windows
+    import tty  # not available on Windows
 
     if link is not None:
         _check_link(link)
     master, slave = os.openpty()
     tty.setraw(slave)
     path = os.ttyname(slave)
-    os.close(slave)  # so that the kernel tells whether somebody has it open
+    os.close(slave)  # so that the kernel reports whether somebody has it open
     os.set_blocking(master, False)
     try:
         if link is not None:
@@ -56,7 +56,7 @@ def serve(
 
 def _check_link(link: Path) -> None:
     if link.exists() and not link.is_symlink():
-        raise VirtualRobotError(f"{link} exists and is no symbolic link; choose another name for the link")
+        raise VirtualRobotError(f"{link} exists and is not a symbolic link; choose another name for the link")
     check_place(link, "the link")
 
 
@@ -67,7 +67,7 @@ def _point(link: Path, path: str) -> None:
 
 
 class _Pump:
-    """Moves bytes between pty and board and keeps virtual time beside the wall's."""
+    """Moves bytes between pty and board and keeps virtual time in step with the wall clock."""
 
     def __init__(self, rig: Any, master: int) -> None:
         self._rig = rig

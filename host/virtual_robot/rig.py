@@ -27,17 +27,17 @@ from virtual_robot.sealed import draw_effects, specimen
 from virtual_robot.uno import CLOCK_HZ, Uno
 
 FIRMWARE = Path(__file__).resolve().parents[2] / ".pio" / "build" / "uno" / "firmware.elf"
-_USB_FRAME_S = 1e-3  # the USB chip hands bytes over once a millisecond
+_USB_FRAME_S = 1e-3  # the USB chip passes bytes on once per millisecond
 _GAUGED_PSI = round(int(8.5 / 130.0 * 4096) / 4096 * 130.0, 4)  # 8.5 psi in whole counts of the converter
 
 
 @dataclass(frozen=True)
 class _BenchProfile:
-    """How far the Uno and the instruments are from perfect."""
+    """Imperfections of the Uno and the instruments."""
 
     clock_error: float = 0.0  # of the Uno's resonator
     bootloader_s: float = 0.0
-    wobble: float = 0.0  # of the friction, from run to run
+    wobble: float = 0.0  # run-to-run sd of the friction factor
     noise: Noise = field(default_factory=Noise)
     clock_resolution_s: float = 0.0  # of the instruments' time stamps
 
@@ -49,13 +49,13 @@ _BENCHES = {"ideal": _BenchProfile(), "realistic": _REAL, "worn": _REAL}
 
 
 class World:
-    """Time of the bench (bifa's Clock): the board's cycles, at what its 16 MHz really are."""
+    """Time of the bench (bifa's Clock): the board's cycles, at the true frequency of its 16 MHz clock."""
 
     def __init__(self, uno: Uno, clock_hz: float) -> None:
         self.uno = uno
         self.clock_hz = clock_hz
         self._start_cycle = uno.cycle
-        # Two threads may use a serial port at once; this one lets them take turns at the simulated chip.
+        # Two threads may use a serial port at once; this lock lets them take turns at the simulated chip.
         self.turn = threading.RLock()
 
     @property
@@ -70,7 +70,7 @@ class World:
 
     def run(self, duration_s: float, stop_on_output: bool = False) -> bool:
         """Let time pass; True if it stopped early because the board sent a byte."""
-        # Rounded up, so that waiting for the rest of a cycle gets there.
+        # Rounded up, so that waiting for a fraction of a cycle makes progress.
         with self.turn:
             until = self.uno.cycle + max(0, math.ceil(duration_s * self.clock_hz))
             return self.uno.run_until(until, stop_on_output)
@@ -90,7 +90,7 @@ class VirtualTransport:
             self._world.uno.send(bytes(data))
 
     def read(self, timeout_s: float) -> bytes:
-        """What has arrived, waiting at most `timeout_s` for the first byte; b"" on time-out."""
+        """Return what has arrived, waiting at most `timeout_s` for the first byte; b"" on time-out."""
         with self._world.turn:
             self._check()
             if not self._world.run(timeout_s, stop_on_output=True):
@@ -100,7 +100,7 @@ class VirtualTransport:
             return self._world.uno.receive()
 
     def reset(self) -> None:
-        """What DTR does: an external reset; bytes still under way to the host are lost."""
+        """Reset the board as DTR does; bytes still on their way to the host are lost."""
         self._check()
         self._world.uno.reset("external", self._bootloader_s)
         self._world.uno.receive()
@@ -112,15 +112,15 @@ class VirtualTransport:
         if not self._open:
             raise PortClosedError("the port has been closed")
         if not self._world.uno.powered:
-            raise PortClosedError("the board has lost its power, and its port with it")
+            raise PortClosedError("the board has lost power, so its port is gone")
 
 
-@dataclass(eq=False, repr=False)  # its text would open the seal
+@dataclass(eq=False, repr=False)  # a repr would open the seal
 class VirtualRig:
-    """A bench with everything on it; a context manager.
+    """A complete virtual bench; a context manager.
 
     `transport`, `clock` and `instruments` are what the host sees; `uno` and `plant` let tests press the emergency
-    stop, break a sensor, cut the power or look inside. `truth` are the plant's parameters.
+    stop, break a sensor, cut the power or look inside. `truth` holds the plant's parameters.
     """
 
     uno: Uno
@@ -141,27 +141,27 @@ class VirtualRig:
 
     @property
     def known(self) -> dict[str, float]:
-        """What the lab has measured directly: the halves on its balance, and on its gauge the positive supply at the
-        Uno's preset pressure. The vacuum is what the pump makes of it, and nobody has gauged it."""
+        """What the lab has measured directly: the masses of the halves, and the positive supply, read off a gauge at
+        the Uno's preset pressure. The vacuum depends on the pump and has not been measured."""
         masses = {name: self.plant.parameters[name] for name in ("head_mass_kg", "tail_mass_kg")}
         return {**masses, "supply_positive_psi": _GAUGED_PSI}
 
     def next_session_seed(self) -> int:
-        """Another one for every session: the board takes a key that it had before for the old session."""
+        """A new seed for each session: the board would take a key that it has seen before for the old session."""
         return next(self._session_seeds)
 
     def open_seal(self) -> dict[str, dict[str, float]]:
-        """The effects that this robot has, with their parameters: for when the verdict is in."""
+        """The robot's effects with their parameters, for comparison once the verdict is known."""
         return {name: dict(values) for name, values in self._effects.items()}
 
     def break_sensor(self, chamber: str, volts: float | None) -> None:
-        """Fix a pressure sensor's output ("body", "head", "tail", "regulator"); None = in order again."""
+        """Fix a pressure sensor's output ("body", "head", "tail", "regulator"); None repairs it."""
         self.plant.break_sensor(("body", "head", "tail", "regulator").index(chamber), volts)
 
     serve_pty = serve
 
     def close(self) -> None:
-        """Let go of everything; the EEPROM goes to its file. A second call does nothing."""
+        """Release everything and write the EEPROM to its file. A second call does nothing."""
         self.transport.close()
         self.uno.close()
         self.plant.close()
@@ -184,14 +184,14 @@ def open_rig(
     parameters: Mapping[str, float] | None = None,
     keep_events: bool = True,
 ) -> VirtualRig:
-    """A virtual bench whose board has just been powered.
+    """Open a virtual bench whose board has just been powered up.
 
     `firmware`: an image, ELF or HEX (default: the one that `pio run -e uno` builds). `profile`: "ideal" (the paper's
     equations and white sensor noise), "realistic" (the same with run-to-run spread, coloured noise, clocks that
-    drift and come in steps) or "worn" (beyond the paper's equations in several ways). `seed`: noise, clocks and
+    drift and are quantized) or "worn" (beyond the paper's equations in several ways). `seed`: noise, clocks and
     run-to-run variation. `effects`: `{"hysteresis": {"force_N": 4.0}}`, several at once. `sealed`: a seed that
-    draws a specimen and what nobody is told of: `sealed_kind` "single" effect, "none", "pair" or "outside".
-    `eeprom`: a file that outlasts the bench. `parameters`: plant parameters to replace.
+    draws a specimen and undisclosed effects of `sealed_kind`: "single", "none", "pair" or "outside".
+    `eeprom`: a file that keeps the EEPROM's contents. `parameters`: plant parameters to replace.
     Raises VirtualRobotError, saying what to do.
     """
     random = np.random.default_rng([seed, 0x51D])
@@ -221,6 +221,6 @@ def open_rig(
 
 
 def _default_image() -> Path:
-    """The one built in this checkout, else one that an installed package offers as an entry point of `bifa.images`."""
+    """The image built in this checkout, else one that an installed package offers by the entry point `bifa.images`."""
     offered = () if FIRMWARE.is_file() else (entry.load()() for entry in entry_points(group="bifa.images"))
     return next((path for path in offered if path), FIRMWARE)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sealed data sets: effects that nobody is told of, drawn by a seed.
+"""Sealed data sets: undisclosed effects, drawn from a seed.
 
     python -m virtual_robot.sealed --seed 7 --out runs/seven
 
-writes a data set of 45 trials into runs/seven and what is in it into runs/seven.sealed.toml, beside the folder,
-which the diagnosis never opens. Another seed is another specimen of the robot, other noise and another order of
-the day. Effect, size (0.3 to 1.5 of what the lab calls modest) and its remaining parameters are drawn as well.
-`--truth foreign` takes a robot that shares no formula with this one or with any library: 48 trials, sizes 0.3 to 1
-(virtual_robot.truths.foreign, docs/truths.md).
+writes a data set of 45 trials to runs/seven, and its truth to runs/seven.sealed.toml beside the folder, which the
+diagnosis never opens. The seed determines the specimen of the robot, the noise, the order of the trials, the effect,
+its size (0.3 to 1.5 times what the lab calls modest) and its other parameters. `--truth foreign` takes a robot that
+shares no formula with this one or with any library: 48 trials, sizes 0.3 to 1 (virtual_robot.truths.foreign,
+docs/truths.md).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ KINDS = ("single", "none", "pair", "outside")
 SIZES = (0.3, 1.5)
 REPEATS = 3
 
-# How much specimens differ, sd of the logarithm.
+# Spread between specimens, sd of the logarithm.
 _SPREAD = {
     "body_damping_Ns_m": 0.08,
     "body_area_N_psi": 0.04,
@@ -58,7 +58,7 @@ class SealedError(VirtualRobotError):
 
 @dataclass(frozen=True)
 class Label:
-    """What is in a sealed data set: the effects with their parameters, and the specimen."""
+    """The truth of a sealed data set: the effects with their parameters, and the specimen."""
 
     seed: int
     kind: str
@@ -97,7 +97,7 @@ def specimen(random: np.random.Generator) -> tuple[dict[str, float], tuple[Curve
 
 
 def draw_effects(kind: str, random: np.random.Generator) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
-    """Effects with their parameters, and each one's factor of its modest size."""
+    """Draw effects: their parameters, and for each the factor of its modest size."""
     pool, count = {"none": (LIBRARY, 0), "single": (LIBRARY, 1), "pair": (LIBRARY, 2), "outside": (OUTSIDE, 1)}[kind]
     names = [str(name) for name in random.choice(pool, count, replace=False)]
     sizes = {name: float(random.uniform(*SIZES)) for name in names}
@@ -114,8 +114,8 @@ def generate(
 ) -> Label:
     """Write the data set `out` and its label; both appear complete or not at all.
 
-    `effect` and `size` (a factor of its modest size) fix what would be drawn. Raises SealedError if `out` exists
-    or the effect is unknown.
+    `effect` and `size` (a factor of its modest size) replace what would be drawn. Raises SealedError if `out`
+    exists, or if the kind or effect is unknown.
     """
     out = Path(out)
     if out.exists():
@@ -160,12 +160,12 @@ def main(arguments: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--out", type=Path, required=True, help="folder of the data set, new")
-    parser.add_argument("--label", type=Path, help="the sealed file (default: OUT.sealed.toml)")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the data set; must not exist")
+    parser.add_argument("--label", type=Path, help="file for the truth (default: OUT.sealed.toml)")
     parser.add_argument("--truth", choices=("own", "foreign"), default="own", help="whose equations (default: own)")
-    parser.add_argument("--effect", help="instead of a drawn one; an unknown name lists them")
-    parser.add_argument("--form", help="of the effect, instead of a drawn one (foreign only)")
-    parser.add_argument("--size", type=float, help="factor of its modest size, instead of a drawn one")
+    parser.add_argument("--effect", help="effect, instead of a drawn one; an unknown name lists all")
+    parser.add_argument("--form", help="form of the effect, instead of a drawn one (foreign only)")
+    parser.add_argument("--size", type=float, help="factor of the effect's modest size, instead of a drawn one")
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument("--kind", choices=("one", "none", "pair", "outside"), default="one")
     for name, text in (
@@ -180,7 +180,7 @@ def main(arguments: list[str] | None = None) -> int:
         if options.truth == "foreign":
             foreign.generate(options.seed, options.out, options.kind, options.effect, options.size, options.form, seal)
         elif options.form is not None:
-            raise SealedError("--form is for --truth foreign: an effect of the own truth has one form")
+            raise SealedError("--form needs --truth foreign: effects of the own truth have only one form")
         else:
             kind_of_own = {"one": "single"}.get(options.kind, options.kind)
             generate(options.seed, options.out, kind_of_own, options.effect, options.size, seal)

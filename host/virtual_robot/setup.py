@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The package is this folder itself, with its subpackages and with the C parts that this machine can compile."""
+"""Packaging: this folder itself is the package `virtual_robot`, with its subpackages and the C parts that compile."""
 
 import sys
 from pathlib import Path
@@ -14,7 +14,7 @@ from build import PARTS, compile_part  # noqa: E402  (the module beside this fil
 
 
 class BuildWithParts(build_py):
-    """An editable installation compiles nothing: `python -m virtual_robot.build` does, beside the sources."""
+    """Compile the C parts, except in an editable installation: there `python -m virtual_robot.build` does it."""
 
     def run(self) -> None:
         super().run()
@@ -22,19 +22,19 @@ class BuildWithParts(build_py):
             for part in PARTS:
                 try:
                     compile_part(part, Path(self.build_lib) / "virtual_robot" / part.built.relative_to(HERE))
-                except Exception as error:  # whatever the compiler raised, wrapped by cffi; the rest works without
-                    self.warn(f"left out, because it did not compile: {part.name} ({error})")
+                except Exception as error:  # any compiler error, wrapped by cffi; the rest works without it
+                    self.warn(f"left out {part.name}, which did not compile: {error}")
 
 
 class WithParts(Distribution):
-    """The wheel belongs to the machine that compiled it."""
+    """Mark the wheel as specific to the platform that compiled it."""
 
     def has_ext_modules(self) -> bool:
         return True
 
 
 setup(
-    script_name="setup.py",  # which is no module of the package
+    script_name="setup.py",  # not a module of the package
     package_dir={"virtual_robot": "."},
     packages=["virtual_robot", *(f"virtual_robot.{name}" for name in find_packages("."))],
     cmdclass={"build_py": BuildWithParts},

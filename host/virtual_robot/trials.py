@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One day in the lab without the Uno: the trials of a data set straight from the plant."""
+"""A day in the lab without the Uno: the trials of a data set, straight from the plant."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Plan:
         return "large" if self.chamber == "body" else "small"
 
     def entry(self) -> dict[str, Any]:
-        """Its keys of [[trial]] in dataset.toml."""
+        """The trial's keys in its [[trial]] table of dataset.toml."""
         entry: dict[str, Any] = {"experiment": self.experiment}
         if self.experiment in ("static_loading", "step_response"):
             entry["actuator"] = self.actuator
@@ -53,7 +53,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Lab:
-    """A robot and its bench. `parameters` are the plant's; `wobble` is the friction's run-to-run sd."""
+    """A robot and its bench. `parameters` are the plant's; `wobble` is the run-to-run sd of the friction factor."""
 
     parameters: Mapping[str, float]
     curves: tuple[Curve, Curve] | None = None
@@ -61,7 +61,7 @@ class Lab:
     wobble: float = 0.01
 
     def run(self, plan: Plan, session_share: float, random: np.random.Generator) -> dict[str, np.ndarray]:
-        """The trial's columns as in the contract's table."""
+        """Run a trial; return its columns as in the contract's table."""
         own = {
             "friction_factor": float(1.0 + self.wobble * random.standard_normal()),
             "ripple_phase_rad": float(random.uniform(0.0, 2.0 * np.pi)),
@@ -80,7 +80,7 @@ class Lab:
 
 
 def _pulled(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
-    """An experiment with a cross-head: to the extended state and back, or the pull, without its very end."""
+    """An experiment with a cross-head: to the extended state and back, or the pull, without its end point."""
     static = plan.experiment == "static_loading"
     contracted, _, extended = plant.landmarks_m(plan.chamber != "body")
     travel = np.round((extended - contracted) * 1e3, 1) * 1e-3 if static else _PULL_M

@@ -2,10 +2,10 @@
 
     PYTHONPATH=tools .venv/bin/python -m mutation                  every mutant
     PYTHONPATH=tools .venv/bin/python -m mutation --sample 100     a fixed sample; part of `make soak`
-    PYTHONPATH=tools .venv/bin/python -m mutation lib/valves       of these files or folders
+    PYTHONPATH=tools .venv/bin/python -m mutation lib/valves       mutants of these files or folders
 
-Prints each survivor and the share that was killed. Survivors that change nothing are listed with the reason in
-tools/mutation/equivalent.toml. Exit status 1 if one survives that is not, or if a listed one is killed or is none.
+Prints each survivor and the share that was killed. Survivors that change no behaviour are listed with reasons in
+tools/mutation/equivalent.toml. Exit status 1 if an unlisted one survives, or a listed one is killed or does not exist.
 """
 
 import argparse
@@ -29,13 +29,13 @@ PROGRESS_S = 10
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run; return the exit status."""
+    """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m mutation", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("files", nargs="*", type=Path, help="files or folders, relative to the project (default: all)")
-    parser.add_argument("--sample", type=int, metavar="N", help="only N of them, always the same")
-    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="how many at once (default: %(default)s)")
+    parser.add_argument("--sample", type=int, metavar="N", help="only a fixed sample of N")
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="how many run at once (default: %(default)s)")
     options = parser.parse_args(arguments)
     equivalent = listed()
     chosen = everything(options.files or [Path("lib") / folder for folder in FOLDERS])
@@ -51,7 +51,7 @@ def _by_chance(mutant: Mutant) -> bytes:
 
 
 def everything(places: Sequence[Path]) -> list[Mutant]:
-    """Every mutant of the sources there; those that are generated are the generator's."""
+    """Every mutant of the sources in `places`, except generated ones, which are their generator's responsibility."""
     files = [file for place in places for file in (sorted((PROJECT / place).glob("*")) or [PROJECT / place])]
     sources = {
         file.relative_to(PROJECT).as_posix(): file.read_text() for file in files if file.suffix in (".h", ".cpp")
@@ -60,13 +60,13 @@ def everything(places: Sequence[Path]) -> list[Mutant]:
 
 
 def listed() -> dict[tuple, str]:
-    """Those that change nothing that anybody could see, with the reason."""
+    """The mutants that change no observable behaviour, with reasons."""
     entries = tomllib.loads(EQUIVALENT.read_text()).get("equivalent", [])
     return {(e["file"], e.get("function", ""), e["before"], e["after"], e.get("turn", 0)): e["reason"] for e in entries}
 
 
 def tried(chosen: Sequence[Mutant], jobs: int, expected: Container) -> dict[Mutant, str]:
-    """What became of each, tried `jobs` at a time; survivors that are not `expected` are printed as they come."""
+    """The verdict on each mutant, `jobs` at a time; survivors that are not `expected` are printed at once."""
     waiting: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
     for mutant in chosen:
         waiting.put(mutant)
@@ -84,7 +84,7 @@ def tried(chosen: Sequence[Mutant], jobs: int, expected: Container) -> dict[Muta
                     print(f"survived: {mutant.name}", flush=True)
         except queue.Empty:
             return
-        except Exception as error:  # told below, in the main thread
+        except Exception as error:  # raised below, in the main thread
             failures.append(error)
 
     workers = [threading.Thread(target=work, args=(number,), daemon=True) for number in range(jobs)]
@@ -100,7 +100,7 @@ def tried(chosen: Sequence[Mutant], jobs: int, expected: Container) -> dict[Muta
 
 
 def report(verdicts: dict[Mutant, str], equivalent: dict, stale: Sequence) -> int:
-    """Print what survived and the share killed; return the exit status."""
+    """Print faults of the list of equivalent mutants, and the share killed; return the exit status."""
     counts = Counter(verdicts.values())
     survivors = [mutant for mutant, verdict in verdicts.items() if verdict == "survived"]
     unlisted = [mutant for mutant in survivors if mutant.key not in equivalent]

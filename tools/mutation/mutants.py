@@ -1,7 +1,7 @@
-"""What may be changed in a C++ source: constants, comparisons, logic, arithmetic, statements.
+"""The mutants of a C++ source: changed constants, comparisons, logic and arithmetic, and removed statements.
 
 A mutant is one edit of one file. The sources are read as tokens, not as text: comments, strings, preprocessor lines and
-templates' brackets are left alone. That relies on the project's formatting, which puts spaces round binary operators.
+template brackets are left alone. This relies on the project's formatting, with spaces around binary operators.
 """
 
 import re
@@ -73,10 +73,10 @@ class Token:
 
 @dataclass(frozen=True)
 class Mutant:
-    """`source[begin:end]` of `file` replaced by `to`; line: its number; before, after: the line without and with it.
+    """`source[begin:end]` of `file` replaced by `to`. line: its number; before, after: the line without and with it.
 
-    function: in which it is, if any; turn: how many alike come before it there. With file, before and after these name
-    the mutant, wherever its line may move to.
+    function: the enclosing one, if any; turn: how many identical mutants precede it there. With file, before and after
+    these identify the mutant, even if its line moves.
     """
 
     file: str
@@ -103,7 +103,7 @@ class Mutant:
 
 
 def mutants(file: str, source: str) -> list[Mutant]:
-    """Every mutant of a source, in the order of the text."""
+    """Every mutant of a source, in text order."""
     tokens = [
         Token(match.lastgroup, match[0], match.start(), match.end())
         for match in TOKEN.finditer(source)
@@ -143,8 +143,8 @@ def _other_numbers(text: str) -> Iterator[str]:
 
 
 def _statements(tokens: list[Token]) -> Iterator[tuple[int, int, str]]:
-    """Simple statements within functions, from their first token to their semicolon, which stays alone."""
-    blocks: list[bool] = []  # of the open braces: whether each is a block of statements
+    """Simple statements within functions, from their first token to their semicolon, which stays."""
+    blocks: list[bool] = []  # for each open brace, whether it opens a block of statements
     brackets = 0
     for at, token in enumerate(tokens):
         brackets += (token.text in ("(", "[")) - (token.text in (")", "]"))
@@ -191,7 +191,7 @@ def _closes_condition(tokens: list[Token], at: int) -> bool:
 
 
 def _end_of_statement(tokens: list[Token], at: int) -> int | None:
-    """The place of its semicolon; None if a block follows first."""
+    """Index of the statement's semicolon; None if a block comes first."""
     depth = 0
     for place in range(at, len(tokens)):
         text = tokens[place].text
@@ -209,7 +209,7 @@ def _end_of_statement(tokens: list[Token], at: int) -> int | None:
 
 
 def _is_declaration(statement: list[Token]) -> bool:
-    """Whether it declares what the rest needs, so that without it nothing compiles; a guard is not needed so."""
+    """Whether it declares a name that later code needs to compile; a guard (`Critical`) does not count."""
     words = [token.text for token in statement]
     if "Critical" in words:
         return False
@@ -230,7 +230,7 @@ def _mutant(file: str, source: str, begin: int, end: int, to: str) -> Mutant:
 
 
 def _function(until: str) -> str:
-    """The function whose body is open at the end of this text, by the indentation that the formatter gives it."""
+    """The function whose body is open at the end of this text, recognized by the formatter's indentation."""
     head = r"^(?:  |    )?[A-Za-z][\w:<>&*, ]*?([\w~]+|operator\S+)\([^;{}]*\)[^;{}]*\{"
     for found in reversed(list(re.finditer(head, until, re.MULTILINE))):
         inside = until[found.end() :]

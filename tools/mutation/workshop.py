@@ -1,4 +1,4 @@
-"""Builds the Unity suites once, then again and again with one file changed, compiling only what depends on it."""
+"""Build the Unity suites once, then repeatedly with one file changed, recompiling only what depends on it."""
 
 import math
 import os
@@ -17,19 +17,19 @@ from mutation.mutants import Mutant
 PROJECT = Path(__file__).resolve().parents[2]
 BUILD = PROJECT / "build" / "mutation"
 COMPILER = os.environ.get("CXX", "g++")
-# As in platformio.ini; the sanitizer finds what would only be undefined.
+# As in platformio.ini; the sanitizer finds mutants that only cause undefined behaviour.
 FLAGS = (
     *("-std=gnu++11", "-O0", "-w", "-DUNITY_SUPPORT_64", "-DUNITY_INCLUDE_DOUBLE", "-DDECIMAL_DIG=__DECIMAL_DIG__"),
     *("-Werror=return-type", "-fsanitize=undefined,bounds-strict", "-fno-sanitize-recover=all"),
 )
-# What the suites on this computer cannot see of the guard, they leave to this one, which reads the chip's instructions.
+# The suites on this computer cannot test all of the guard; this test does, by reading the chip's instructions.
 ON_THE_CHIP = Path("host/tests/firmware/test_critical.py")
 ONLY_ON_THE_CHIP = Path("lib/critical/critical.h")
 
 
 @dataclass
 class Suite:
-    """One Unity suite: its sources with what they are made of, and how long it runs."""
+    """One Unity suite: its sources with the files that each depends on, and how long it runs."""
 
     name: str
     sources: dict[Path, frozenset[Path]] = field(default_factory=dict)
@@ -40,7 +40,7 @@ class Suite:
 
 
 class Workshop:
-    """A copy of the sources, in which one mutant at a time is built and run."""
+    """A copy of the sources in which mutants are built and run one at a time."""
 
     def __init__(self, name: str) -> None:
         self.folder = BUILD / name
@@ -56,7 +56,7 @@ class Workshop:
         self.kills: Counter[tuple[Path, str]] = Counter()
 
     def build(self, files: Collection[Path]) -> None:
-        """The suites that depend on any of `files`, as they are; RuntimeError if one does not pass."""
+        """Build the unchanged suites that depend on any of `files`; RuntimeError if one does not pass."""
         units = [path.relative_to(self.folder) for path in sorted(self.folder.glob("lib/*/*.cpp"))]
         parts = {unit: self._compile(unit) for unit in units}
         self._run(
@@ -76,7 +76,7 @@ class Workshop:
         self.suites.sort(key=lambda suite: suite.seconds)
 
     def verdict(self, mutant: Mutant) -> str:
-        """ "killed", "survived" or "does not compile"."""
+        """Build and run a mutant; return "killed", "survived" or "does not compile"."""
         file = Path(mutant.file)
         path = self.folder / file
         source = path.read_text()
@@ -89,7 +89,7 @@ class Workshop:
     def _tried(self, file: Path) -> str:
         changed: dict[Path, Path] = {}
         concerned = [suite for suite in self.suites if suite.depends_on(file)]
-        # First the one that killed most of this file's mutants so far, then the quickest.
+        # The one that has killed most of this file's mutants comes first, then the quickest.
         for suite in sorted(concerned, key=lambda suite: -self.kills[file, suite.name]):
             for unit, parts in suite.sources.items():
                 if file not in parts or unit in changed:
@@ -110,13 +110,13 @@ class Workshop:
         return subprocess.run(command, cwd=self.folder, capture_output=True).returncode == 0
 
     def _passes(self, suite: Suite, limit_s: float, changed: dict[Path, Path] | None = None) -> str:
-        """What is wrong with a suite, empty if nothing."""
+        """What is wrong with a suite; empty if it passes."""
         objects = [(changed or {}).get(unit, self._object(unit)) for unit in suite.sources]
         linked = subprocess.run(self._linking(*objects, self._object("unity")), capture_output=True)
         if linked.returncode:
             return f"does not link: {linked.stderr.decode(errors='replace')[-500:]}"
         try:
-            # Processor time, since a busy machine makes any suite slow.
+            # Limit processor time, since a busy machine makes any suite slow.
             limited = ["prlimit", f"--cpu={math.ceil(limit_s)}", self._program]
             done = subprocess.run(limited, capture_output=True, timeout=600)
         except subprocess.TimeoutExpired:
@@ -125,7 +125,7 @@ class Workshop:
         return "" if done.returncode == 0 and done.stdout.rstrip().endswith(b"\nOK") else "fails"
 
     def _linked(self, main: Path, units: list[Path]) -> list[Path]:
-        """Which of the units a suite needs, by the linker's own account."""
+        """The units that a suite needs, as reported by the linker."""
         archive = self.folder / "all.a"
         if not archive.exists():
             self._run(["ar", "rcs", archive, *map(self._object, units)])
@@ -134,11 +134,11 @@ class Workshop:
         return [unit for unit in units if self._object(unit).name in members]
 
     def _linking(self, *parts: Path | str) -> list:
-        """The command that makes the suite's program of these."""
+        """The command that links these into the suite's program."""
         return [COMPILER, *FLAGS, *parts, "-o", self._program]
 
     def _compile(self, unit: Path) -> frozenset[Path]:
-        """Compile; return the files that it is made of, itself included."""
+        """Compile a unit; return the files that it depends on, itself included."""
         target = self._object(unit)
         self._run([COMPILER, *FLAGS, *self.includes, "-MMD", "-c", self.folder / unit, "-o", target])
         words = re.sub(r"\\\n", " ", target.with_suffix(".d").read_text()).split(": ", 1)[1].split()
@@ -164,7 +164,7 @@ class Workshop:
 
 
 def _unity() -> Path:
-    """Unity's sources, as PlatformIO has installed them for the native suites."""
+    """Folder of Unity's sources, which PlatformIO has installed for the native suites."""
     found = sorted(PROJECT.glob(".pio/libdeps/*/Unity/src/unity.c"))
     if not found:
         raise RuntimeError("Unity is not installed: run `.venv/bin/pio test -e native` once")

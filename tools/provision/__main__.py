@@ -14,9 +14,9 @@ CORE_DIR = PROJECT / ".platformio"
 
 
 def main() -> int:
-    """Decide between registry and stand-ins, lay out what is missing, and say in one line which is used."""
+    """Decide between registry and stand-ins, lay out what is missing, and print one line saying which is used."""
     parser = argparse.ArgumentParser(prog="python -m provision", description=main.__doc__)
-    parser.add_argument("--again", action="store_true", help="forget the last decision and ask the registry again")
+    parser.add_argument("--again", action="store_true", help="forget the last decision and query the registry again")
     arguments = parser.parse_args()
     try:
         known = None if arguments.again else decision.remembered(CORE_DIR)
@@ -49,7 +49,7 @@ def provision() -> str:
 
 
 def install_from_registry() -> None:
-    """Download now, so that nothing is downloaded at run time."""
+    """Download the packages now, so that nothing is downloaded at run time."""
     if subprocess.run([sys.executable, "-m", "platformio", "pkg", "install"], cwd=PROJECT).returncode:
         raise ProvisionError("PlatformIO could not install its packages; see its message above")
 

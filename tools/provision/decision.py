@@ -1,4 +1,4 @@
-"""Which of the two worlds was chosen, and whether what was laid out then still fits."""
+"""Which source was chosen, registry or stand-ins, and whether what was laid out then is still valid."""
 
 import hashlib
 import json
@@ -15,19 +15,19 @@ FILE = "provisioned.json"
 
 @dataclass(frozen=True)
 class Decision:
-    """source: "registry" or "stand-ins"; fingerprint: of everything that the laid-out files depend on."""
+    """source: "registry" or "stand-ins"; fingerprint: hash of everything that the laid-out files depend on."""
 
     source: str
     fingerprint: str
 
     def save(self, core_dir: Path) -> None:
-        """Remember the decision; written last, so that an interrupted provisioning starts anew."""
+        """Remember the decision; written last, so that an interrupted provisioning starts again."""
         core_dir.mkdir(exist_ok=True)
         (core_dir / FILE).write_text(json.dumps(asdict(self)) + "\n")
 
 
 def remembered(core_dir: Path) -> Decision | None:
-    """Return the last decision if it still fits, else None."""
+    """Return the last decision if it is still valid, else None."""
     try:
         decision = Decision(**json.loads((core_dir / FILE).read_text()))
     except (OSError, ValueError, TypeError):

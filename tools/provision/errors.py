@@ -1,4 +1,4 @@
-"""What can go wrong while provisioning, said as a sentence that names the remedy."""
+"""Errors of provisioning, each a sentence that names the remedy."""
 
 
 class ProvisionError(Exception):

@@ -13,7 +13,7 @@ from pathlib import Path
 class Package:
     """One package of a PlatformIO core directory.
 
-    kind: "platform", "tool" or "library"; `version`: semantic, its true origin in the build suffix;
+    kind: "platform", "tool" or "library"; `version`: semantic, with its true origin in the build suffix;
     fill: puts the contents into the given empty folder.
     """
 
@@ -38,7 +38,7 @@ class Package:
         unfinished.rename(folder)
 
     def label(self) -> dict:
-        """What PlatformIO reads to decide that a package is installed."""
+        """The label that PlatformIO reads to decide that a package is installed."""
         spec = {"owner": self.owner, "id": None, "name": self.name, "requirements": None, "uri": None}
         return {"type": self.kind, "name": self.name, "version": self.version, "spec": spec}
 

@@ -1,4 +1,4 @@
-"""Does PlatformIO's registry answer? Asked with a deadline, because PlatformIO itself waits for a minute."""
+"""Whether PlatformIO's registry answers within a deadline; PlatformIO itself would wait for a minute."""
 
 import queue
 import threading
@@ -18,7 +18,7 @@ def package_urls() -> list[str]:
 def answers(urls: Iterable[str], deadline_s: float = DEADLINE_S) -> bool:
     """Return whether any of `urls` describes a package within `deadline_s` seconds in all.
 
-    Name resolution ignores time-outs, so each address is asked in a thread that is left behind if it hangs.
+    Name resolution ignores time-outs, so each address is queried in a thread that is abandoned if it hangs.
     """
     urls = list(urls)
     verdicts: queue.Queue[bool] = queue.Queue()

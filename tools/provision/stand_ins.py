@@ -1,4 +1,4 @@
-"""The stand-in packages: which there are, where each goes, and what PlatformIO must find beside them."""
+"""The stand-in packages: which there are, where each goes, and what else PlatformIO must find."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ IN_THE_YEAR_2100 = 4102444800
 SETTINGS_FILE = "stand_ins.ini"
 SETTINGS = """\
 ; Written by tools/provision because PlatformIO's registry could not be reached.
-; Delete the folder and run `make setup` to decide anew.
+; Delete the folder and run `make setup` to decide again.
 [platformio]
 core_dir = .platformio
 """
@@ -100,7 +100,7 @@ def _mcp4725() -> Package:
 
 
 def _application_state() -> dict:
-    """PlatformIO's memory of its last run: nothing to upgrade, nothing to look for, nothing to report."""
+    """PlatformIO's record of its last run, such that it upgrades, looks up and reports nothing."""
     return {
         "last_version": platformio.__version__,
         "last_check": {"platformio_upgrade": IN_THE_YEAR_2100, "prune_system": IN_THE_YEAR_2100},

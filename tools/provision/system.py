@@ -1,4 +1,4 @@
-"""What the distribution provides: AVR tools on PATH, the Arduino core, and which versions they are."""
+"""What the distribution provides: AVR tools on PATH, the Arduino core, and their versions."""
 
 import shutil
 import subprocess
@@ -11,12 +11,12 @@ AVR_TOOLS = ("ar", "as", "c++filt", "g++", "gcc", "gcc-ar", "gcc-ranlib", "ld", 
 
 
 def avr_tools() -> dict[str, Path]:
-    """Return name -> program of the AVR tool chain, or say which Debian package lacks."""
+    """Return name -> program of the AVR tool chain; ProvisionError names the missing Debian packages."""
     return {f"avr-{name}": program(f"avr-{name}", "gcc-avr binutils-avr avr-libc") for name in AVR_TOOLS}
 
 
 def program(name: str, debian_packages: str) -> Path:
-    """Return where `name` is, or raise ProvisionError naming the packages that bring it."""
+    """Return the path of `name`, or raise ProvisionError naming the packages that provide it."""
     found = shutil.which(name)
     if not found:
         raise ProvisionError(f"{name} is not on PATH; install it: sudo apt-get install {debian_packages}")
@@ -33,7 +33,7 @@ def arduino_core() -> dict[str, Path]:
 
 
 def debian_version(package: str) -> str:
-    """Return the installed version of a Debian package, `unknown` where dpkg does not know it."""
+    """Return the installed version of a Debian package, `unknown` if dpkg does not know it."""
     try:
         query = subprocess.run(
             ["dpkg-query", "--show", "--showformat=${Version}", package], capture_output=True, text=True, check=True

@@ -1,4 +1,4 @@
-"""ThrowTheSwitch's Unity, the C test framework, out of the Debian source package that carries a copy."""
+"""ThrowTheSwitch's Unity, the C test framework, from the Debian source package that contains a copy."""
 
 import json
 import re
@@ -25,7 +25,7 @@ BUILD_SCRIPT = """\
 Import("env")
 env.Append(CPPDEFINES=["UNITY_INCLUDE_CONFIG_H"], CPPPATH=["$BUILD_DIR/unity_config"])
 """
-SATISFIES = "2.6.1"  # what PlatformIO asks for; the true version stands in the suffix
+SATISFIES = "2.6.1"  # what PlatformIO asks for; the true version is in the suffix
 
 
 def unity(cache: Path) -> Package:
@@ -60,7 +60,7 @@ def _fetch(cache: Path) -> None:
 
 
 def extract(archives: list[Path], destination: Path) -> None:
-    """Copy Unity's sources and licence out of the carrier's archive, whatever folder they lie in."""
+    """Copy Unity's sources and licence out of the carrier's archive, whatever folder they are in."""
     destination.mkdir(parents=True, exist_ok=True)
     wanted = re.compile(r"/unity/(?:src/(" + "|".join(map(re.escape, FILES)) + r")|docs/(license\.txt))$")
     for archive in archives:

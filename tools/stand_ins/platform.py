@@ -1,4 +1,4 @@
-"""Both stand-in platforms: whatever else they are, they put their libraries back when these are missing.
+"""Both stand-in platforms, which put their libraries back when these are missing.
 
 PlatformIO calls `configure_project_packages` before it looks for a project's libraries, so the stand-in
 libraries survive `pio run -t fullclean` and a removed `.pio` folder.
@@ -15,7 +15,7 @@ from platformio.platform.base import PlatformBase
 
 
 class OtherPlatformIO(UserSideException):
-    """Said at once; PlatformIO itself would try for a minute to download the SCons of its own version."""
+    """Raised at once; PlatformIO itself would try for a minute to download its own version's SCons."""
 
     MESSAGE = "the stand-ins were laid out for another PlatformIO than {0}; use .venv/bin/pio (or run `make setup`)"
 
@@ -30,7 +30,7 @@ class StandInPlatform(PlatformBase):
             raise OtherPlatformIO(__version__)
         core_dir = Path(self.config.get("platformio", "core_dir"))
         destination = Path(self.config.get("platformio", "libdeps_dir")) / env
-        # PlatformIO would uninstall what platformio.ini named otherwise before, though it is what is named now.
+        # With this file, PlatformIO would uninstall libraries that platformio.ini used to name differently.
         (destination / "integrity.dat").unlink(missing_ok=True)
         for kept in sorted((core_dir / "stand_in_libraries" / self.name).iterdir()):
             installed = destination / kept.name

@@ -1,5 +1,5 @@
-"""Small systems of other kinds than robots, drawn from seeds; what each lacks is sealed.
+"""Small systems other than robots, drawn from seeds; what each model lacks is sealed.
 
-`kinds/` one file a kind: the model with its candidates as its owner would write it, and the truth in other formulas.
-`draw.py` makes a set of a seed, `instrument.py` measures it, `distinct.py` draws again what could not be told.
+`kinds/` has one file per kind: the model with its candidates as its owner would write it, and the truth in other
+formulas. `draw.py` draws a set from a seed, `instrument.py` measures it, `distinct.py` rejects undecidable sets.
 """

@@ -1,4 +1,4 @@
-"""Effects at the input or the output of any kind, none of which is ever there."""
+"""Candidate effects at the input or output of any kind, none of which is ever present."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lacuna import Effect, Parameter
 
 @dataclass(frozen=True)
 class Decoy:
-    """What it makes of a signal, given as multiples of its amplitude, at `share`s of the run, for a `size`."""
+    """An effect that `changes` a signal, in units of its amplitude, at `share`s of the run, by a `size`."""
 
     at_input: bool
     typical: float
@@ -107,13 +107,13 @@ DECOYS: dict[str, Decoy] = {
 
 
 def effect_of(name: str) -> Effect:
-    """The decoy as its owner declares it, in shares of amplitude and duration."""
+    """The decoy as a declared effect, in shares of amplitude and duration."""
     decoy = DECOYS[name]
     return Effect(name, Parameter("size", "1", decoy.typical, *decoy.bounds), absent=decoy.absent)
 
 
 def changed(signal: np.ndarray, time_s: np.ndarray, amplitude: float, sizes: dict[str, float]) -> np.ndarray:
-    """`signal` with the decoys of these sizes, in the order in which they are listed here."""
+    """`signal` with the decoys of these sizes, in the order of `DECOYS`."""
     share = (time_s - time_s[0]) / (time_s[-1] - time_s[0])
     for name, decoy in DECOYS.items():
         if (size := sizes.get(name, decoy.absent)) != decoy.absent:

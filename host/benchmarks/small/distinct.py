@@ -1,4 +1,4 @@
-"""Whether a set can be told at all: how near the noiseless truth each explanation on offer comes, at its best."""
+"""Whether a set is decidable: how close each offered explanation can come to the noiseless truth."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from benchmarks.systems.problem import absent
 from lacuna import Effect
 from lacuna.values import Values
 
-_BEGUN = (1.0, 0.4, 2.0)  # times the declared sizes
-_RIGHT = 0.8  # noises that the truth's own candidates may leave, at most
-_WRONG = 1.1  # noises that everything else must leave, at least,
-_APART = 1.7  # and times what is right leaves
+_BEGUN = (1.0, 0.4, 2.0)  # starting points, as multiples of the declared sizes
+_RIGHT = 0.8  # largest error, in noises, that the true candidates may leave
+_WRONG = 1.1  # least error, in noises, that everything else must leave,
+_APART = 1.7  # and as a multiple of what the true candidates leave
 
 
 def tellable(offered: Offered, clean: Sequence[np.ndarray], truth: Sequence[str], base: float, noise: float) -> bool:
-    """Whether those of `truth` that are on offer explain what is seen, and nothing smaller or other does. `base`: what
-    the base model leaves at its best."""
+    """Whether the offered effects of `truth` explain the data, and nothing smaller or different does. `base`: error of
+    the base model at its best."""
     library = {e.name: e for e in offered.effects}
     there = [library[name] for name in truth if name in library]
     right = left_by(offered, clean, there) / noise if there else base / noise
@@ -38,19 +38,19 @@ def tellable(offered: Offered, clean: Sequence[np.ndarray], truth: Sequence[str]
 
 
 def _no_pair(offered: Offered, clean: Sequence[np.ndarray], others: Sequence[Effect], alone, noise: float) -> bool:
-    """Whether no two of the three best explain what is withheld."""
+    """Whether no two of the three best candidates together explain the withheld effect."""
     best = sorted(others, key=lambda e: alone[e.name])[:3]
     return all(left_by(offered, clean, pair) / noise > 0.9 for pair in combinations(best, 2))
 
 
 def left_by(offered: Offered, clean: Sequence[np.ndarray], effects: Sequence[Effect] = ()) -> float:
-    """RMS difference from the noiseless truth after the best of a few fits; what a run's drift could be is no
-    difference."""
+    """RMS difference from the noiseless truth after the best of a few fits; differences that a run's drift could
+    explain do not count."""
     return closest(offered, clean, effects)[1]
 
 
 def closest(offered: Offered, clean: Sequence[np.ndarray], effects: Sequence[Effect]) -> tuple[dict[str, float], float]:
-    """The fitted values by full name, and the RMS difference that they leave."""
+    """The best fit: values by full name, and the remaining RMS difference."""
     named = [(p.name, p) for p in offered.parameters] + [(e.full_name(p), p) for e in effects for p in e.parameters]
     lower, upper = (np.array([getattr(p, end) for _, p in named]) for end in ("lower", "upper"))
     scale = np.array([abs(p.value) for _, p in named])
@@ -84,6 +84,6 @@ def _one_a_condition(offered: Offered):
 
 
 def _without_drift(time_s: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Less its straight line."""
+    """The residual less its straight line."""
     columns = np.column_stack([np.ones(len(time_s)), time_s / time_s[-1]])
     return residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]

@@ -1,4 +1,4 @@
-"""A set of a kind from its seed: what its owner has, and apart from it what is true."""
+"""Draw a set of some kind from its seed: what its owner has, and separately the truth."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from benchmarks.small.kinds import KINDS
 from benchmarks.small.offered import Offered, OfferedModel, OfferedRun
 from lacuna import Effect, Parameter
 
-TOLD = Path(__file__).with_name("told.json")  # by truth and seed, which draw can be told
+TOLD = Path(__file__).with_name("told.json")  # by truth and seed, the first decidable draw
 TRUTHS = ("single", "none", "outside", "pair", "decoys")
 MANY = 20  # decoys
 _ATTEMPTS = 200
-_NOISES = (2.5, 6.0)  # that the base model misses by, at its best
-_SHARES = (1e-3, 3e-2)  # of the output's spread, that noise may be
+_NOISES = (2.5, 6.0)  # error of the base model at its best, in noises
+_SHARES = (1e-3, 3e-2)  # allowed noise, as a share of the output's spread
 _STRIDE = 3  # through a kind's forms
 
 
 class UntellableError(Exception):
-    """No set of this job came out that anybody could tell."""
+    """No decidable set was drawn for this job."""
 
 
 @dataclass(frozen=True)
 class UnseenRun:
-    """A run that nobody is given: what happens without noise, to compare predictions with."""
+    """A run that nobody is given, without noise, to compare predictions with."""
 
     name: str
     time_s: np.ndarray
@@ -44,8 +44,8 @@ class UnseenRun:
 
 @dataclass(frozen=True)
 class Sealed:
-    """What is true of a set: the `effects` that are there by name (`offered` of them on offer), their formulas and
-    values, the base's values, how it was measured, and runs that nobody has seen."""
+    """The truth of a set: names of the `effects` that are present (`offered`: those on offer), their formulas and
+    values with the base's, how it was measured, and runs that nobody has seen."""
 
     effects: tuple[str, ...]
     offered: tuple[str, ...]
@@ -57,28 +57,28 @@ class Sealed:
 
 
 def drawn(truth: str, seed: int) -> tuple[Offered, Sealed]:
-    """The set of this seed, the same on every call. `truth`: "single", "none", "outside" (one effect, not on offer),
-    "pair", or "decoys" (twenty that are not there, beside one effect or nothing). Raises UntellableError."""
+    """Draw the set of this seed, the same on every call. `truth`: "single", "none", "outside" (one effect, not on
+    offer), "pair", or "decoys" (twenty absent ones, beside one effect or none). Raises UntellableError."""
     attempt = which(truth, seed)
     found = one_draw(truth, seed, attempt, tellable=lambda *given: True)
     if found is None:
-        raise UntellableError(f"{truth} {seed}: draw {attempt} is not what it was when it was told")
+        raise UntellableError(f"{truth} {seed}: draw {attempt} is not what it was when it was found decidable")
     return found
 
 
 def which(truth: str, seed: int) -> int:
-    """The first of a seed's draws that can be told: looked up where that is known, since it takes many fits. Raises
+    """The first decidable draw of a seed: looked up if known, since finding it takes many fits. Raises
     UntellableError."""
     known = _told().get(f"{truth} {seed}")
     return sought(truth, seed) if known is None else known
 
 
 def sought(truth: str, seed: int) -> int:
-    """The same by trying them. Raises UntellableError."""
+    """Find the first decidable draw by trying. Raises UntellableError."""
     for attempt in range(_ATTEMPTS):
         if one_draw(truth, seed, attempt, tellable):
             return attempt
-    raise UntellableError(f"{truth} {seed} ({_kind(seed).key}): nothing came out in {_ATTEMPTS} draws")
+    raise UntellableError(f"{truth} {seed} ({_kind(seed).key}): no decidable set in {_ATTEMPTS} draws")
 
 
 @cache
@@ -91,7 +91,7 @@ def _kind(seed: int) -> Kind:
 
 
 def one_draw(truth: str, seed: int, attempt: int, tellable: Callable[..., bool]) -> tuple[Offered, Sealed] | None:
-    """A draw; None if it cannot be told."""
+    """Draw attempt number `attempt`; None if it is not decidable."""
     draw = np.random.default_rng([seed, TRUTHS.index(truth), attempt])
     kind, turn, key = _kind(seed), seed // len(KINDS), f"{truth} {seed}"
     forms = _forms(truth, kind, turn, draw)
@@ -129,7 +129,7 @@ def _between(draw: np.random.Generator, ends: tuple[float, float]) -> float:
 
 
 def _forms(truth: str, kind: Kind, turn: int, draw: np.random.Generator) -> tuple[Form, ...]:
-    """What is there: forms in turn, so that each kind's come up equally often."""
+    """The forms that are present, taken in turn so that a kind's forms come up equally often."""
     first = kind.forms[_STRIDE * turn % len(kind.forms)]
     if truth == "none" or (truth == "decoys" and turn % 2):
         return ()
@@ -140,13 +140,13 @@ def _forms(truth: str, kind: Kind, turn: int, draw: np.random.Generator) -> tupl
 
 
 def _values(kind: Kind, forms: Sequence[Form], draw: np.random.Generator) -> dict[str, float]:
-    """Of the base around, and not at, what is declared; of the forms within their ranges."""
+    """True values: of the base around its declared values, of the forms within their ranges."""
     base = {p.name: p.value * float(np.exp(0.2 * draw.standard_normal())) for p in kind.parameters}
     return base | {name: _between(draw, ends) for form in forms for name, ends in form.ranges.items()}
 
 
 def _instrument(draw: np.random.Generator) -> Instrument:
-    """Each fault in some sets."""
+    """Draw an instrument; each fault occurs in some sets."""
     return Instrument(
         noise=1.0,
         colored=float(draw.uniform(1.5, 5.0)) * (draw.random() < 0.3),
@@ -158,7 +158,7 @@ def _instrument(draw: np.random.Generator) -> Instrument:
 
 
 def _conditions(kind: Kind, repeats: int, instrument: Instrument, draw: np.random.Generator):
-    """(name, times, input) of each: four where they are repeated, else eight."""
+    """(name, times, input) of each condition: four if they are repeated, else eight."""
     shapes = tuple(SHAPES) if repeats == 1 else tuple(draw.choice(tuple(SHAPES), 2, replace=False))
     found = []
     for shape in shapes:
@@ -173,7 +173,7 @@ def _applied(kind: Kind, shape: str, size: float, time_s: np.ndarray, draw: np.r
 
 
 def _offered(truth: str, kind: Kind, effects, conditions, spread: float, draw, key: str) -> Offered:
-    """The declaration, at which the owner guessed, and runs yet to be measured."""
+    """The owner's declaration, with guessed values, and runs yet to be measured."""
     guess = float(f"{spread:.1g}")
     own, decoys = _candidates(truth, kind, effects, draw)
     return Offered(
@@ -187,8 +187,8 @@ def _offered(truth: str, kind: Kind, effects, conditions, spread: float, draw, k
 
 
 def _candidates(truth: str, kind: Kind, effects, draw) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
-    """Three to eight of the kind's own, those that are there among them unless they are withheld, in any order; or
-    twenty that are not there, and what is."""
+    """Candidates: three to eight of the kind's own in random order, including those present unless withheld; or
+    twenty absent ones and those present."""
     there = [e for e in kind.effects if e.name in effects and truth != "outside"]
     others = [e for e in kind.effects if e.name not in effects]
     others = [others[k] for k in draw.permutation(len(others))]
@@ -202,7 +202,7 @@ def _candidates(truth: str, kind: Kind, effects, draw) -> tuple[tuple[Effect, ..
 
 
 def _guessed(p: Parameter, by: float, draw: np.random.Generator) -> Parameter:
-    """A declared value that nobody knew well, to two digits."""
+    """The parameter with a poorly known declared value, to two digits."""
     value = float(f"{p.value * np.exp(by * draw.standard_normal()):.2g}")
     return replace(p, value=float(np.clip(value, p.lower, p.upper)))
 
@@ -212,8 +212,8 @@ def _drift(scale: float) -> tuple[Parameter, ...]:
 
 
 def _options(kind: Kind, instrument: Instrument, repeats: int, draw: np.random.Generator) -> dict:
-    """What owners know of their instrument: some its noise from the data sheet, and those without repeats that noise
-    has a color, or how long it lasts."""
+    """What owners know of their instrument: some know its noise from the data sheet, and some of those without
+    repeats know that the noise is colored, or its correlation time."""
     options = {}
     declared, how = draw.random() < 0.3, draw.random()
     if declared:
@@ -235,7 +235,7 @@ def _measured(
 
 
 def _judged(kind: Kind, values: Mapping[str, float], draw: np.random.Generator) -> tuple[UnseenRun, ...]:
-    """Two runs under conditions that nobody is given, one of them larger than any."""
+    """Two runs under conditions that nobody is given, one of them larger than any other."""
     time_s = np.arange(kind.samples) * (kind.duration_s / kind.samples)
     found = []
     for shape, size in zip(("multisine", "steps"), kind.judged, strict=True):

@@ -1,4 +1,4 @@
-"""Shapes of inputs, between -1 and 1 or near it, as functions of time over the duration of a run."""
+"""Shapes of inputs, roughly between -1 and 1, as functions of time over the duration of a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def shaped(shape: str, time_s: np.ndarray, duration_s: float, draw: np.random.Ge
 
 
 def _steps(share: np.ndarray, draw: np.random.Generator) -> np.ndarray:
-    """Twelve levels held in turn, a rest first; they come to nothing together."""
+    """Twelve levels held in turn after a short rest; their sum is zero."""
     levels = draw.permutation(np.repeat([-1.0, -0.5, 0.5, 1.0], 3))
     return np.concatenate([levels, levels[-1:]])[np.clip((share * 12).astype(int), 0, 12)] * (share > 0.02)
 

@@ -1,4 +1,4 @@
-"""What the records of small systems come to: rates with 95 % Wilson intervals, beside peers on the same sets."""
+"""Figures of the records of small systems: rates with 95 % Wilson intervals, beside peers on the same sets."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def named(record: dict) -> list[str]:
 
 
 def rates(records: Sequence[dict]) -> dict[str, list[bool]]:
-    """Hits and misses by what they are of; a crash is a miss."""
+    """Hits and misses by title; a crash is a miss."""
     single, none, outside, pair, decoys = ([r for r in records if r["kind"] == kind] for kind in _KINDS)
     found = (
         [named(r)[:1] == r["truth"] for r in single],
@@ -48,17 +48,17 @@ def rates(records: Sequence[dict]) -> dict[str, list[bool]]:
 
 
 def _false(record: dict) -> bool:
-    """Whether something is named that is not there."""
+    """Whether an effect is named that is not present."""
     return not set(named(record)) <= set(record["truth"])
 
 
 def right(record: dict, said: Sequence[str]) -> bool:
-    """Whether what is there and on offer was named, no more and no fewer."""
+    """Whether exactly the effects that are present and offered were named."""
     return sorted(said) == record["on_offer"]
 
 
 def report(records: Sequence[dict]) -> None:
-    """Print the rates, the peers', what it cost, and what was named for what."""
+    """Print the rates, those of the peers, the costs, and the effects named for each truth."""
     print(f"{len(records)} small systems; engine {', '.join(sorted({r['version'] for r in records}))}\n")
     print(f"{'':46}{'found':30}required")
     for title, hits in rates(records).items():
@@ -68,7 +68,7 @@ def report(records: Sequence[dict]) -> None:
     print(f"\n{count} sets that others were asked, too; right: what is there and on offer, and nothing else")
     print(f"{'':28}{'right':28}{'predicts off by, noises':26}processor, s; simulations")
     print(f"{'':28}{'':28}{'single  none  withheld':26}medians")
-    same = [r for r in records if "peers" in r] or records  # where peers were asked, on their sets alone
+    same = [r for r in records if "peers" in r] or records  # if peers were run, only on their sets
     print(_row("lacuna", same, [right(r, named(r)) for r in same], same))
     for peer in dict.fromkeys(name for r in records for name in r.get("peers", {})):
         asked = [(r, r["peers"][peer]) for r in records if peer in r.get("peers", {}) and _applies(peer, r)]
@@ -98,7 +98,7 @@ def _row(name: str, records: Sequence[dict], hits: Sequence[bool], answers: Sequ
 
 
 def _applies(peer: str, record: dict) -> bool:
-    """Sparse regression is asked only for what is a term of a sum."""
+    """Whether a peer applies: sparse regression only if the effects are terms of a sum."""
     if not peer.startswith("sparse"):
         return True
     terms = {name.split(".")[0] for name in TERMS[record["system"]].of}

@@ -1,4 +1,4 @@
-"""How the output is measured: noise, its color, rounding, drift, missing samples, an uneven clock."""
+"""Measurement of the output: white and colored noise, rounding, drift, missing samples, an uneven clock."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_COLORED = 0.7  # of the variance, where noise is colored: the rest is white
-_GAPS = 0.12  # of the samples, where some are missing
+_COLORED = 0.7  # of the variance of colored noise; the rest is white
+_GAPS = 0.12  # of the samples, if some are missing
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """`noise`: standard deviation of all that is random in a sample, rounding among it, in the output's unit;
-    `colored`: its correlation time in samples, 0: white; `rounds`: the meter's step in standard deviations, 0: none;
-    `drifts`: standard deviation of a run's zero and of its change during the run, in units of the noise, 0: none."""
+    """`noise`: standard deviation of all random error of a sample, rounding included, in the output's unit; `colored`:
+    correlation time in samples, 0: white; `rounds`: the meter's step in standard deviations, 0: none; `drifts`:
+    standard deviation of a run's zero and of its change during the run, in units of the noise, 0: none."""
 
     noise: float
     colored: float = 0.0
@@ -25,7 +25,7 @@ class Instrument:
 
     @property
     def step(self) -> float:
-        """The meter's, so that noise and rounding come to `noise` together."""
+        """The meter's step, such that noise and rounding together amount to `noise`."""
         return self.rounds * self._random
 
     @property
@@ -33,14 +33,14 @@ class Instrument:
         return self.noise / np.sqrt(1.0 + self.rounds**2 / 12.0)
 
     def times(self, duration_s: float, samples: int, draw: np.random.Generator) -> np.ndarray:
-        """When samples are taken."""
+        """Sample times."""
         if not self.uneven:
             return np.arange(samples) * (duration_s / samples)
         gaps = np.exp(0.5 * draw.standard_normal(samples))
         return np.round(np.cumsum(gaps) - gaps[0], 12) * (duration_s / gaps.sum())
 
     def measured(self, clean: np.ndarray, time_s: np.ndarray, draw: np.random.Generator) -> np.ndarray:
-        """One run; NaN where a sample is missing."""
+        """One measured run; NaN where a sample is missing."""
         n = len(clean)
         share = time_s / time_s[-1]
         zero, slope = self.drifts * self.noise * draw.standard_normal(2)
@@ -49,12 +49,12 @@ class Instrument:
             found = self.step * np.round(found / self.step)
         if self.gaps:
             first = draw.integers(1, n - n // 20 - 1)
-            found[first : first + n // 20] = np.nan  # one stretch, and samples here and there
+            found[first : first + n // 20] = np.nan  # one gap, and single samples
             found[1:][draw.random(n - 1) < _GAPS - 0.05] = np.nan
         return found
 
     def _noise(self, time_s: np.ndarray, draw: np.random.Generator) -> np.ndarray:
-        """Of unit variance."""
+        """Noise of unit variance."""
         white = draw.standard_normal(len(time_s))
         if not self.colored:
             return white

@@ -1,4 +1,4 @@
-"""Two integrators that share nothing: one for the models that owners write, one, much finer, for the truth.
+"""Two independent integrators: one for the models that owners write, and a much finer one for the truth.
 
 The input is held between samples in both. Rates and readings are compiled functions of time, state, input and the
 values `p`; a rate writes into its last argument.
@@ -13,7 +13,7 @@ _ROW = types.Array(float64, 1, "C")
 RATE, READ = void(float64, _ROW, float64, _ROW, _ROW), float64(float64, _ROW, float64, _ROW)
 _RATE_TYPE, _READ_TYPE = types.FunctionType(RATE), types.FunctionType(READ)
 _RUN = _ROW(_RATE_TYPE, _READ_TYPE, _ROW, _ROW, _ROW, _ROW, float64, float64)
-FINER = 6  # steps of the truth in one of a model
+FINER = 6  # steps of the truth per step of a model
 
 rate = njit(RATE, nogil=True, cache=True)
 read = njit(READ, nogil=True, cache=True)
@@ -30,7 +30,7 @@ def _supplied(time_s, held, supplied, at_s):
 
 @njit(_RUN, nogil=True, cache=True)
 def modeled(rates, reading, time_s, held, start, p, delay_s, step_s):
-    """Classical Runge and Kutta; a late input is averaged over each step, so that the delay has a derivative."""
+    """Classical Runge-Kutta; a delayed input is averaged over each step, so that the delay has a derivative."""
     n, states = len(time_s), len(start)
     found, x, supplied = np.empty(n), start.copy(), np.zeros(n)
     k1, k2, k3, k4 = np.zeros(states), np.zeros(states), np.zeros(states), np.zeros(states)
@@ -57,7 +57,7 @@ def modeled(rates, reading, time_s, held, start, p, delay_s, step_s):
 
 @njit(_RUN, nogil=True, cache=True)
 def true(rates, reading, time_s, held, start, p, delay_s, step_s):
-    """Ralston's method of third order; what is late in a truth is so by its states, not by `delay_s`."""
+    """Ralston's third-order method; delays of a truth come from its states, not from `delay_s`."""
     found, x = np.empty(len(time_s)), start.copy()
     k1, k2, k3 = np.zeros(len(start)), np.zeros(len(start)), np.zeros(len(start))
     for i in range(len(time_s)):

@@ -1,4 +1,4 @@
-"""What is told of a kind of system: the model that its owner has, its candidates, and what is true instead."""
+"""Description of a kind of system: its owner's model, the candidates, and the truth."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lacuna import Effect, Parameter
 
 @dataclass(frozen=True)
 class Form:
-    """A formula of `effect` that the library has not. `ranges`: its values in the truth's `p`, drawn between these."""
+    """A formula of `effect` that the library lacks. `ranges`: its values in the truth's `p` are drawn from these."""
 
     effect: str
     formula: str
@@ -26,12 +26,12 @@ class Form:
 class Kind:
     """A kind of system.
 
-    `rates`, `reading` with `states` are the model: its `p` are the parameters of the base and then those of `effects`,
-    in the order of their declaration. `true_rates`, `true_reading` with `true_states`: the same base, and every form in
-    `forms`, whose `p` are the base's parameters and then `true_off`, values at which there is no effect. `start`: of
-    the first states, at rest. `delay`: the effect by which the model's input is late, if there is one.
+    `rates` and `reading`, with `states` states, are the model; its `p` are the parameters of the base, then those of
+    `effects` in the order of declaration. `true_rates` and `true_reading`, with `true_states`, are the truth: the same
+    base with every form in `forms`; its `p` are the base's parameters, then those named in `true_off`, whose values
+    turn the forms off. `start`: the first states at rest. `delay`: the effect that delays the model's input, if any.
 
-    The input is `bias` plus `sizes` times a shape (`excitation.py`), at least `least`; `judged` are further sizes.
+    The input is `bias` plus `sizes` times a shape (`excitation.py`), at least `least`; `judged`: sizes of unseen runs.
     """
 
     key: str
@@ -52,7 +52,7 @@ class Kind:
     samples: int
     sizes: tuple[float, float]
     judged: tuple[float, float]
-    steps: int = 2  # of the model's integrator in a sample
+    steps: int = 2  # of the model's integrator per sample
     bias: float = 0.0
     least: float = -np.inf
     start: tuple[float, ...] = ()
@@ -65,7 +65,7 @@ class Kind:
 
     @cached_property
     def off(self) -> dict[str, float]:
-        """The model's values with nothing but the base, at its declared values."""
+        """Values of the base model alone, at its declared values."""
         return {p.name: p.value for p in self.parameters} | absent(self.effects)
 
     @property
@@ -73,14 +73,14 @@ class Kind:
         return self.duration_s / self.samples / self.steps
 
     def model(self, time_s: np.ndarray, applied: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
-        """The owner's model; candidates without values are off."""
+        """Output of the owner's model; candidates without values are off."""
         p = np.array([values.get(name, self.off[name]) for name in self.names])
         delay_s = values.get(f"{self.delay}.delay_s", 0.0) if self.delay else 0.0
         start = self._start(self.states)
         return modeled(self.rates, self.reading, time_s, applied, start, p, delay_s, self.step_s)
 
     def truth(self, time_s: np.ndarray, applied: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
-        """What really happens; forms without values are not there."""
+        """Output of the truth; forms without values are off."""
         p = np.array([values[p.name] for p in self.parameters] + [values.get(k, v) for k, v in self.true_off.items()])
         start = self._start(self.true_states)
         return true(self.true_rates, self.true_reading, time_s, applied, start, p, 0.0, self.step_s)

@@ -1,4 +1,4 @@
-"""What the owner of a system has: a model with its candidates, and records. Nothing here knows what is true."""
+"""What the owner of a system has: a model with its candidates, and records. Nothing here knows the truth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lacuna import Effect, Parameter, Record, System
 
 @dataclass(frozen=True)
 class OfferedModel:
-    """`simulate` of one set, of whole numbers and names alone, so that it can be sent anywhere."""
+    """`simulate` of one set, made of plain values only, so that it can be pickled."""
 
     kind: str
     decoys: tuple[str, ...] = ()
@@ -43,7 +43,7 @@ def _in(name: str) -> bool:
 
 @dataclass(frozen=True)
 class OfferedRun:
-    """One record as the owner has it. `condition`: runs with an equal one repeat one another."""
+    """One record as the owner has it. Runs with equal `condition` are repeats."""
 
     name: str
     condition: str
@@ -54,7 +54,7 @@ class OfferedRun:
 
 @dataclass(frozen=True)
 class Offered:
-    """`parameters`, `effects`, `nuisances` as declared, `options` further arguments of `lacuna.System`."""
+    """`parameters`, `effects` and `nuisances` as declared; `options`: further arguments of `lacuna.System`."""
 
     key: str
     model: OfferedModel
@@ -69,7 +69,7 @@ class Offered:
         return KINDS[self.model.kind]
 
     def system(self, simulate: Callable[..., Any] | None = None) -> System:
-        """The system as a stranger declares it; `simulate` in the place of the model, if given."""
+        """The system as any user would declare it; `simulate` replaces the model if given."""
         return System(
             simulate or self.model,
             self.parameters,
@@ -82,7 +82,7 @@ class Offered:
 
     @cached_property
     def tables(self) -> list[dict[str, Any]]:
-        """The records as a stranger hands them in: columns and labels."""
+        """The records as any user would pass them: columns and labels."""
         return [
             {"name": r.name, "condition": r.condition, "time_s": r.time_s}
             | {self.kind.input: r.applied, self.kind.output: r.measured}
@@ -91,7 +91,7 @@ class Offered:
 
     @cached_property
     def records(self) -> tuple[Record, ...]:
-        """The same for those that take `Record`s."""
+        """The same as `Record`s."""
         return tuple(self.record(r.name, r.condition, r.time_s, r.applied, r.measured) for r in self.runs)
 
     def record(self, name: str, condition: str, time_s: np.ndarray, applied: np.ndarray, output: np.ndarray) -> Record:

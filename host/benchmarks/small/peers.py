@@ -1,4 +1,4 @@
-"""What others make of the same sets, with the rivals of `benchmarks.systems`."""
+"""Other methods on the same sets, with the rivals of `benchmarks.systems`."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from benchmarks.systems.problem import KnownProblem, RivalAnswer
 from benchmarks.systems.rivals import best_subset, gaussian_process, sparse_regression
 
 _STARTS, _POINTS = 2, 200
-_ALL_PAIRS = 8  # candidates; where there are more, the best one is grown
+_ALL_PAIRS = 8  # candidates; if there are more, only pairs with the best single one are tried
 
 
 def problem(offered: Offered) -> KnownProblem:
-    """The set as the rivals take it: nothing in it is known of the truth."""
+    """The set as the rivals take it, without its truth."""
     return KnownProblem(
         key=offered.key,
         name=offered.kind.name,
@@ -36,7 +36,7 @@ def problem(offered: Offered) -> KnownProblem:
 
 
 def _terms(offered: Offered):
-    """For sparse regression: where the model is a sum of terms, sampled evenly and without gaps."""
+    """Terms for sparse regression, if the model is a sum of terms, sampled evenly and without gaps; else None."""
     terms = TERMS.get(offered.kind.key)
     if terms is None or any(_uneven(run.time_s) or np.isnan(run.measured).any() for run in offered.runs):
         return None
@@ -50,8 +50,8 @@ def _uneven(time_s: np.ndarray) -> bool:
 
 
 def by_bic(given: KnownProblem) -> RivalAnswer:
-    """The set of up to two with the least BIC (no truth has more): all of them, or grown from the best one. Pairs are
-    begun once, where the other explanations are begun twice."""
+    """The set of up to two effects with the least BIC (no truth has more), among all pairs or those with the best
+    single effect. Pairs are fitted from one start, other explanations from two."""
     names = list(given.library)
     found = {chosen: best_subset.fit(given, chosen, _STARTS) for chosen in [(), *((name,) for name in names)]}
     pairs = list(combinations(names, 2))

@@ -1,4 +1,4 @@
-"""One set through the engine's front door, and through the peers; the seal is opened afterwards."""
+"""Run one set through the engine's public interface and the peers; the seal is opened afterwards."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Predict = Callable[[Record], np.ndarray]
 
 
 def diagnosed(offered: Offered) -> tuple[dict[str, Any], dict[str, Any], Predict | None]:
-    """What the engine says of a set, what it tried, and the model that it completes. An engine that raises has said
+    """The engine's verdict on a set, its search record, and the completed model. If the engine raises, the verdict is
     "crash"."""
     simulations = SimulationCount()
     system = offered.system(simulations.of(offered.model))
     began = time.process_time()
     try:
         verdict = lacuna.diagnose(system, offered.tables, progress=False)
-    except Exception as error:  # whatever it is, the trial goes on and counts it
+    except Exception as error:  # whatever it is, the trial continues and counts it
         said = {"verdict": "crash", "effects": [], "crash": f"{type(error).__name__}: {error}"[:300]}
         return said | _cost(began, simulations), {}, None
     spent = _cost(began, simulations)
@@ -43,7 +43,7 @@ def _cost(began: float, simulations: SimulationCount) -> dict[str, Any]:
 
 
 def asked(offered: Offered, sealed: Sealed) -> dict[str, dict[str, Any]]:
-    """What each peer names, how far it predicts off, and what it costs; without those that do not apply."""
+    """What each peer names, its prediction error, and its cost; without peers that do not apply."""
     given, found = problem(offered), {}
     for name, solve in PEERS.items():
         if name.startswith("sparse") and given.terms is None:
@@ -60,8 +60,8 @@ def asked(offered: Offered, sealed: Sealed) -> dict[str, dict[str, Any]]:
 
 
 def predicted_off(offered: Offered, sealed: Sealed, predict: Predict) -> float | None:
-    """RMS difference from what would happen without noise, under conditions that nobody was given, in noises; None
-    where there is no prediction."""
+    """RMS error of predictions under conditions that nobody was given, against the noiseless truth, in noises; None if
+    there is no prediction."""
     squares = []
     for run in sealed.judged:
         record = offered.record(run.name, run.name, run.time_s, run.applied, np.full(len(run.time_s), np.nan))
@@ -71,7 +71,7 @@ def predicted_off(offered: Offered, sealed: Sealed, predict: Predict) -> float |
 
 
 def opened(offered: Offered, sealed: Sealed) -> dict[str, Any]:
-    """What the seal held, for the record."""
+    """The contents of the seal, for the record."""
     instrument = sealed.instrument
     faults = {name: getattr(instrument, name) for name in ("colored", "rounds", "drifts", "gaps", "uneven")}
     return {

@@ -1,7 +1,7 @@
-"""Find which draw of each seed can be told, and keep it: `python -m benchmarks.small.told single 7000 7056`.
+"""Find the decidable draw of each seed, and store it: `python -m benchmarks.small.told single 7000 7056`.
 
-A set then costs a tenth of a second in place of some seconds, and is the same on a machine whose fits end in another
-last digit.
+Drawing a set then takes a tenth of a second instead of some seconds, and gives the same set on a machine whose fits
+differ in the last digit.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from benchmarks.small.draw import TOLD, TRUTHS, UntellableError, sought
 
 
 def keep(found: Mapping[str, int]) -> None:
-    """Add to what is known; the file is the old one or the new one."""
+    """Add `found` to the stored draws, replacing the file atomically."""
     known = json.loads(TOLD.read_text(encoding="utf-8")) | found
     lines = ",\n".join(f'"{key}": {known[key]}' for key in sorted(known, key=_order))
     new = TOLD.with_suffix(".new")

@@ -1,1 +1,1 @@
-"""Systems with a known structural error, and what people use to find it: `make bench ARGS="--only systems"`."""
+"""Systems with a known structural error, and methods that people use to find it: `make bench ARGS="--only systems"`."""

@@ -1,10 +1,10 @@
-"""An oscillator with hysteresis whose force has a memory of its own: simulated, as the benchmark describes it.
+"""An oscillator with dynamic hysteresis, simulated as the benchmark describes it.
 
     m y'' + c y' + k y + z = u,    z' = alpha y' - beta (gamma |y'| |z|^(nu - 1) z + delta y' |z|^nu),    nu = 1
 
 J.P. Noël and M. Schoukens, "Hysteretic benchmark with a dynamic nonlinearity", Workshop on Nonlinear System
-Identification Benchmarks, 2016, doi 10.4121/12967592: their constants, their sampling (750 Hz, made at 15 kHz) and
-noise (0.008 mm). The model knows mass, damper and spring. `z` is not measured, so there is nothing to differentiate.
+Identification Benchmarks, 2016, doi 10.4121/12967592: their constants, sampling (750 Hz, simulated at 15 kHz) and
+noise (0.008 mm). The model has mass, damper and spring. `z` is not measured, so there is nothing to differentiate.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def position_m(force, steps, m, c, k, alpha, gamma, delta, coulomb, cubic, drag,
     found, state, h = np.empty(len(force)), (0.0, 0.0, 0.0, 0.0), 1 / 750 / steps
     for i in range(len(force)):
         found[i] = state[0]
-        for s in range(steps):  # Runge and Kutta's of fourth order
+        for s in range(steps):  # classical Runge-Kutta of fourth order
             at = i + s / steps - delay_s * 750
             half = _between(force, at + 0.5 / steps)
             r1 = _rate(state, _between(force, at), p)
@@ -63,7 +63,7 @@ def position_m(force, steps, m, c, k, alpha, gamma, delta, coulomb, cubic, drag,
 
 
 def simulate(record, theta):
-    """Displacement from rest, freely; `theta` in the order in which its parameters are declared."""
+    """Free-run displacement from rest; `theta` in the order of declaration."""
     return {"displacement_mm": 1e3 * position_m(record["force_N"], 4, *theta.values())}
 
 
@@ -72,7 +72,7 @@ PARAMETERS = (
     Parameter("damping_Ns_m", "N s/m", 20.0, 0.5, 400.0),
     Parameter("stiffness_N_m", "N/m", 8e4, 1e4, 4e5),
 )
-_hysteresis = (  # stiffness before it yields, and the two numbers of the loop's shape
+_hysteresis = (  # initial stiffness, and the two parameters of the loop's shape
     Parameter("stiffness_N_m", "N/m", 3e4, 0.0, 2e5),
     Parameter("gamma_1_m", "1/m", 500.0, 0.0, 5e3),
     Parameter("delta_1_m", "1/m", 0.0, -5e3, 5e3, scale=200.0),
@@ -89,7 +89,7 @@ EFFECTS = (
 
 
 def problem(seed: int = 0) -> KnownProblem:
-    """Multisines of 30 and 50 N, two runs of each, to fit; another of 40 N and a sweep of 40 N to judge by."""
+    """Multisines of 30 and 50 N, two runs of each, to fit; another of 40 N, and a sweep of 40 N, held out."""
     draw = np.random.default_rng(seed)
     inputs = {size: _multisine(draw, size) for size in (30.0, 50.0)}
     fitted = [_measured(draw, "multisine", size, force, run) for size, force in inputs.items() for run in (1, 2)]
@@ -116,7 +116,7 @@ def _times() -> np.ndarray:
 
 
 def _multisine(draw: np.random.Generator, rms_N: float) -> np.ndarray:
-    """Random phases, 5 to 150 Hz."""
+    """A random-phase multisine from 5 to 150 Hz."""
     tones = np.arange(5, 151)[:, None]
     shape = np.sin(2 * np.pi * (tones * _times() + draw.random(tones.shape))).sum(0)
     return rms_N * shape / np.std(shape)

@@ -1,8 +1,8 @@
-"""EMPS, measured: a cart on a screw whose friction is not the same in both directions.
+"""EMPS, measured: a cart on a screw, with friction that depends on the direction.
 
 A. Janot, M. Gautier, M. Brunot, "Data set and reference models of EMPS", Workshop on Nonlinear System Identification
-Benchmarks, 2019. Model and candidates are those of `docs/examples/emps.py`. The records lie beside the
-checkout, or not.
+Benchmarks, 2019. Model and candidates are those of `docs/examples/emps.py`. The records may be absent;
+they are expected beside the checkout.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from lacuna import Record, windows
 ROOT = Path(__file__).resolve().parents[3]
 DATA = ROOT.parent / "shared" / "data" / "emps"
 EXAMPLE = ROOT / "docs" / "examples" / "emps.py"
-TERMS = Terms(  # the constant is the offset's and the asymmetric friction's alike; a delay is no term of a sum
+TERMS = Terms(  # the constant is shared by offset and asymmetric friction; a delay is not a term of a sum
     {
         "mass_kg": lambda q, v, u, pulses: u,
         "viscous.damping_Ns_m": lambda q, v, u, pulses: v,
@@ -37,13 +37,13 @@ TERMS = Terms(  # the constant is the offset's and the asymmetric friction's ali
 
 
 def absent() -> str:
-    """Why it cannot be run here; empty if it can."""
+    """Why the system cannot be run here; empty if it can."""
     missing = [name for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat") if not (DATA / name).exists()]
     return f"{' and '.join(missing)} not in {DATA.relative_to(ROOT.parent)} beside the checkout" if missing else ""
 
 
 def problem() -> KnownProblem:
-    """Windows of 1 s: of the benchmark's first record to fit, of the one with pulses to judge by."""
+    """Windows of 1 s: those of the benchmark's first record to fit, those of the one with pulses held out."""
     example = _example()
     first, second = (example.read(DATA / name) for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))
     return KnownProblem(
@@ -71,6 +71,6 @@ def _records(tables) -> tuple[Record, ...]:
 def _example() -> ModuleType:
     spec = importlib.util.spec_from_file_location("emps", EXAMPLE)
     module = importlib.util.module_from_spec(spec)
-    sys.modules["emps"] = module  # compiled code that is loaded again looks its module up by name
+    sys.modules["emps"] = module  # cached compiled code looks its module up by name
     spec.loader.exec_module(module)
     return module

@@ -1,5 +1,5 @@
-"""How much a person writes, by one rule: the lines of the named functions, classes and values that are code, without
-those that are blank, comment or docstring, and without imports."""
+"""Count the lines that a person writes, by one rule: lines of code in the named functions, classes and values, without
+blank lines, comments, docstrings and imports."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from types import ModuleType
 
 
 def lines_of(module: ModuleType, names: Collection[str] | None = None) -> int:
-    """Of what `names` define at the top of `module`; None: of all of it. Raises ValueError where there is no such name.
+    """Lines of what `names` define at the top of `module`; None: of all of it. Raises ValueError for unknown names.
 
-    A line counts once, whatever stands on it; formatted as the linter has it, at 120 columns.
+    A line counts once, whatever is on it; the source is formatted by the linter, at 120 columns.
     """
     source = inspect.getsource(module)
     nodes = [node for node in ast.parse(source).body if not isinstance(node, ast.Import | ast.ImportFrom)]

@@ -1,4 +1,4 @@
-"""What every rival is given, what it hands back, and how that is judged: the same for all."""
+"""What every rival is given, what it returns, and how that is judged: the same for all."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Predict = Callable[[Record], np.ndarray]
 
 @dataclass(frozen=True)
 class Terms:
-    """The right-hand side as a sum, for sparse regression: `inertia` x acceleration = `of[inertia]`, what drives, less
+    """The right-hand side as a sum, for sparse regression: `inertia` x acceleration = `of[inertia]`, the drive, less
     the sum of `parameter` x `of[parameter]`. Each function takes position, speed and the `inputs`, shape (n,) each, in
-    SI units. Candidates that are no such term are not in it. `order`: of the equation, where 1 the rate in place of the
-    acceleration, and no speed; `unit` of the output in SI."""
+    SI units. Candidates that are not such a term are left out. `order` of the equation: with 1, the rate takes the
+    place of the acceleration, and there is no speed. `unit` of the output in SI."""
 
     of: Mapping[str, Callable[..., np.ndarray]]
     inertia: str
@@ -29,12 +29,12 @@ class Terms:
     unit: float = 1e-3
 
     def only(self, names: Collection[str]) -> Terms:
-        """Those of `names`."""
+        """Only the terms of `names`."""
         return replace(self, of={name: term for name, term in self.of.items() if name in names})
 
 
 def absent(effects: Iterable[Effect]) -> dict[str, float]:
-    """Values of `effects`, by full name, with which none of them is there."""
+    """Values of `effects`, by full name, at which all of them are absent."""
     off: dict[str, float] = {}
     for effect in effects:
         off |= effect.typical | dict.fromkeys(effect.size_names, effect.absent)
@@ -45,12 +45,12 @@ def absent(effects: Iterable[Effect]) -> dict[str, float]:
 class KnownProblem:
     """A system whose structural error is known. `key` names it in bench.json.
 
-    `simulate(record, theta)` with `parameters` is the model, `effects` the candidates that everybody is offered,
-    `truth` those of them that are there, `expected` the engine's verdict if it is right. `fitted` and `held_out`:
-    records, of which the latter are conditions that nobody fits. `cut` makes of `fitted` what the engine is given,
-    where that is one long record. `nuisances` are what the engine is told of; others take their values as they are.
-    `terms`, or why there are `no_terms`. `model_lines`, `terms_lines`: what a person writes for the model with its
-    candidates, and for `terms`.
+    `simulate(record, theta)` with `parameters` is the model, `effects` are the candidates offered to everybody, `truth`
+    those that are present, `expected` the correct verdict of the engine. `fitted` and `held_out`: records; the latter
+    are of conditions that nobody fits. `cut` turns `fitted` into what the engine is given, if that is one long record.
+    `nuisances` are declared to the engine only; others keep them at their declared values. `terms`, or the reason why
+    there are `no_terms`. `model_lines`, `terms_lines`: lines that a person writes for the model with its candidates,
+    and for `terms`.
     """
 
     key: str
@@ -76,29 +76,29 @@ class KnownProblem:
         return {effect.name: effect for effect in self.effects}
 
     def free(self, effects: Sequence[str] = ()) -> list[Parameter]:
-        """The parameters of the model with `effects`, by their full names and as declared."""
+        """The parameters of the model with `effects`, with their full names, as declared."""
         of_effects = [(e.full_name(p), p) for e in map(self.library.get, effects) for p in e.parameters]
         return [*((p.name, p) for p in self.parameters), *of_effects]
 
     def theta(self, record: Record, found: Mapping[str, float]) -> Values:
-        """What `simulate` gets: `found` by full name, effects without one at the value at which they are absent."""
+        """The argument of `simulate`: `found` by full name; effects without values are absent."""
         own = {p.name: p.value for p in (self.nuisances(record) if callable(self.nuisances) else self.nuisances)}
         return Values({p.name: p.value for p in self.parameters} | absent(self.effects) | own | dict(found))
 
     def predict(self, record: Record, found: Mapping[str, float]) -> np.ndarray:
-        """The output of one record, simulated freely, shape (n,)."""
+        """Free-run output for one record, shape (n,)."""
         return np.asarray(self.simulate(record, self.theta(record, found))[self.output])
 
     def residual(self, found: Mapping[str, float], records: Sequence[Record]) -> np.ndarray:
-        """Predicted less measured, of all `records` in a row, without samples that are missing."""
+        """Prediction minus measurement, concatenated over `records`, without missing samples."""
         return np.concatenate([(self.predict(r, found) - r.channels[self.output])[self.there(r)] for r in records])
 
     def there(self, record: Record) -> np.ndarray:
-        """Which of its samples were measured."""
+        """Which samples of a record were measured."""
         return np.isfinite(record.channels[self.output])
 
     def error_percent(self, predict: Predict) -> float:
-        """RMS error on the conditions that nobody fitted, in percent of the standard deviation of what was measured."""
+        """RMS error on the conditions that nobody fitted, in percent of the standard deviation of the measurements."""
         measured = np.concatenate([r.channels[self.output] for r in self.held_out])
         predicted = np.concatenate([predict(r) for r in self.held_out])
         return float(100.0 * np.sqrt(np.mean((predicted - measured) ** 2)) / np.std(measured))

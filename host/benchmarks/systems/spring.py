@@ -1,4 +1,4 @@
-"""The toy: a mass on a spring that hides Coulomb friction and a stiffening spring, measured with noise.
+"""The toy system: a mass on a spring with hidden Coulomb friction and stiffening, measured with noise.
 
     m x'' = u(t - delay) - k x - k3 x^3 - b x' - c |x'| x' - f sign(x') - d [x' > 0],    y = (1 + gain) x
 
@@ -45,7 +45,7 @@ def _position_m(force, mass, k, b, coulomb, k3, drag, delay_s, gain, difference,
 
 
 def simulate(record, theta):
-    """Position from rest, freely; what is not on offer is not there."""
+    """Free-run position from rest; effects that are not offered are absent."""
     return {"position_mm": 1e3 * _position_m(record["force_N"], *(theta.get(name, 0.0) for name in NAMES))}
 
 
@@ -62,9 +62,9 @@ EFFECTS = (
     Effect("sensor_gain", Parameter("gain", "1", 0.05, -0.3, 0.3)),
     Effect("asymmetric_friction", Parameter("difference_N", "N", 0.3, -2.0, 2.0)),
 )
-NUISANCES = (Parameter("wobble", "1", 0.0, -0.5, 0.5, scale=0.02),)  # of the damping, from run to run
+NUISANCES = (Parameter("wobble", "1", 0.0, -0.5, 0.5, scale=0.02),)  # relative, of the damping from run to run
 NAMES = [*(p.name for p in PARAMETERS), *(name for e in EFFECTS for name in e.size_names), "wobble"]
-TERMS = Terms(  # neither a delay nor a gain of the sensor is a term of a sum
+TERMS = Terms(  # a delay and a sensor gain are not terms of a sum
     {
         "mass_kg": lambda x, v, u: u,
         "stiffness_N_m": lambda x, v, u: x,
@@ -80,8 +80,8 @@ TERMS = Terms(  # neither a delay nor a gain of the sensor is a term of a sum
 
 
 def problem(hidden: Mapping[str, float] = HIDDEN, withheld: Collection[str] = (), seed: int = 0) -> KnownProblem:
-    """Steps and sweeps of 1 and 2 N, three times each, to fit; of 1.5 and 3 N, once each, to judge by. `hidden`: what
-    is there, by full parameter name; `withheld`: effects that nobody is offered."""
+    """Steps and sweeps of 1 and 2 N, three times each, to fit; of 1.5 and 3 N, once each, held out. `hidden`: values
+    of the effects present, by full parameter name; `withheld`: effects that nobody is offered."""
     draw = np.random.default_rng(seed)
     shapes = ("steps", "sweep")
     fitted = [measured(draw, hidden, s, size, run) for s in shapes for size in (1.0, 2.0) for run in (1, 2, 3)]
@@ -110,7 +110,7 @@ def problem(hidden: Mapping[str, float] = HIDDEN, withheld: Collection[str] = ()
 
 
 def measured(draw: np.random.Generator, hidden: Mapping[str, float], shape: str, size_N: float, run: int) -> Record:
-    """One record of `steps` or a `sweep` of so many newtons."""
+    """One noisy record of "steps" or a "sweep" of amplitude `size_N`."""
     time_s = np.arange(0.0, 6.0, SAMPLE_S)
     if shape == "steps":
         force_N = size_N * (((time_s > 0.5) & (time_s < 2)).astype(float) - ((time_s > 3) & (time_s < 4.5)))

@@ -1,4 +1,4 @@
-"""The comparison: every rival on every system, one block of rows each."""
+"""The comparison: every rival on every system, one block of rows per system."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.systems.rivals import best_subset, engine, gaussian_process, spa
 
 @dataclass(frozen=True)
 class Rival:
-    """`lines`: what it takes to call it, beside the model; `by_terms`: it needs the model as a sum of terms as well."""
+    """`lines` needed to call it, besides the model; `by_terms`: whether it also needs the model as a sum of terms."""
 
     key: str
     name: str
@@ -44,8 +44,8 @@ RIVALS = (
 
 
 def compare(problem: KnownProblem) -> dict[str, float]:
-    """Print a block of rows, the first one for the model as it is; returns the figures flat."""
-    for record in problem.fitted:  # what compiles does so here
+    """Print a block of rows, the first one for the base model; return the figures flat."""
+    for record in problem.fitted:  # compiles just-in-time code before timing
         problem.predict(record, {})
     there = " + ".join(sorted(problem.truth)) or "nothing that is on offer"
     samples = sum(len(r.time_s) for r in problem.fitted)
@@ -78,8 +78,7 @@ def _row(problem: KnownProblem, rival: Rival) -> dict[str, float]:
 
 
 def judged(problem: KnownProblem, answer: RivalAnswer) -> tuple[str, str]:
-    """Whether what was named is what is there, neither more nor less, and a verdict, if there is one, says so; and what
-    was named."""
+    """Whether exactly the present effects were named, with the expected verdict if there is one; and what was named."""
     if answer.named is None:
         return "-", "(it names nothing)"
     named = " + ".join(sorted(answer.named))

@@ -1,13 +1,13 @@
-"""Two tanks above one another, of which the upper overflows: simulated, as the benchmark describes them.
+"""Two cascaded tanks, of which the upper one overflows, simulated as the benchmark describes them.
 
     x1' = k4 u - k1 sqrt(x1) + w1,    x2' = k1 sqrt(x1) - k3 sqrt(x2) + w2,    y = x2 + e,
 
-and where x1 stands at the brim, 10, what is too much is lost but for a share, which falls into the lower tank.
+and while x1 is at the brim, 10, the excess is lost except for a share, which falls into the lower tank.
 M. Schoukens and J.P. Noël, "Three Benchmarks Addressing Open Challenges in Nonlinear System Identification", IFAC World
-Congress, 2017, doi 10.1016/j.ifacol.2017.08.071. They publish a record and no constants: these here are of our own, so
-chosen that 1024 samples at 4 s look alike (levels from 2 to 10 V, minutes in which the upper tank overflows).
-What leaves the upper tank enters the lower one at the same rate (their k2 is k1): the level that is not measured would
-have no scale otherwise. The upper tank's level is not measured, so there is nothing to differentiate.
+Congress, 2017, doi 10.1016/j.ifacol.2017.08.071. They publish a record but no constants; ours are
+chosen so that 1024 samples at 4 s look similar (levels from 2 to 10 V, minutes in which the upper tank overflows).
+The outflow of the upper tank enters the lower one at the same rate (their k2 is k1); otherwise the unmeasured level
+would have no scale. Since the upper tank's level is not measured, there is nothing to differentiate.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from benchmarks.systems.problem import KnownProblem
 from lacuna import Effect, Parameter, Record, segments
 
 SAMPLE_S, SAMPLES, BRIM_V = 4.0, 1024, 10.0
-NOISE_V, PROCESS_V = 0.02, 1e-3  # of the sensor; of both levels, each second
+NOISE_V, PROCESS_V = 0.02, 1e-3  # sd of the sensor's noise; of the process noise of both levels, per second
 
 
 @numba.njit(nogil=True, cache=True)
@@ -43,7 +43,7 @@ def levels(pump_V, noise, k1, k3, k4, brim, share, leak, dead_V, full_V, lag_s, 
 
 
 def simulate(record, theta):
-    """Level of the lower tank, freely, both tanks empty at first; `theta` in the order of its declaration."""
+    """Free-run level of the lower tank, with both tanks empty at first; `theta` in the order of declaration."""
     pump_V = record["pump_V"]
     return {"level_V": levels(pump_V, np.zeros((len(pump_V), 2)), *theta.values())}
 
@@ -53,7 +53,7 @@ PARAMETERS = (
     Parameter("k3", "sqrt(V)/s", 0.06, 0.01, 0.3),
     Parameter("k4", "1/s", 0.05, 0.01, 0.3),
 )
-_share = Parameter("share", "1", 0.3, 0.0, 1.0)  # of what overflows, into the lower tank
+_share = Parameter("share", "1", 0.3, 0.0, 1.0)  # of the overflow, which enters the lower tank
 EFFECTS = (
     Effect("overflow", (Parameter("brim_V", "V", 9.0, 3.0, np.inf), _share), absent=np.inf),
     Effect("leak", Parameter("rate_1_s", "1/s", 0.002, 0.0, 0.05)),
@@ -67,7 +67,7 @@ TRUTH = (0.055, 0.050, 0.043, BRIM_V, 0.35, 0.0, 0.0, np.inf, 0.0, 0.0, 0.0)
 
 
 def problem(seed: int = 0) -> KnownProblem:
-    """One record to fit, cut into segments of one run for the engine, and one of another input to judge by."""
+    """One record to fit, cut into segments of one run for the engine, and one held out, with another input."""
     draw = np.random.default_rng(seed)
     return KnownProblem(
         key="tanks",

@@ -1,1 +1,1 @@
-"""The whole loop as stages: measure, fit, diagnose, optimise, walk, compare."""
+"""Campaigns: measure, fit, diagnose, optimise, walk and compare, as stages."""

@@ -1,8 +1,8 @@
-"""To the edge in steps that cannot lose much, and walks are data too.
+"""Approach the edge in steps that risk little, with walks fed back as data.
 
-First the robust gait of the completed model is walked, then the one at the edge of what is known of it. Every walk is
-fed back and the model completed again before the next gait is sought: a walk that was predicted narrows what is known,
-and so moves the edge; one that was not, or that fell off the edge, corrects it.
+The robust gait of the completed model is walked first, then the one at the edge of what is known of it. After each
+round the walks are added to the data and the model is completed again before the next gait is sought: a walk that was
+predicted narrows the uncertainty and so moves the edge; one that was not, or that failed, corrects the model.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from bifa.robot import Model, load_model, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 
 ROUNDS = 3
-_PREDICTED = 0.005  # of a speed that repeats agree about more closely: what its prediction may be wrong by
-_UNCHANGED = 0.01  # of the measured speed
+_PREDICTED = 0.005  # relative error of a predicted speed that is allowed even if the repeats agree more closely
+_UNCHANGED = 0.01  # relative difference of measured speeds that counts as none
 
 
 class Ending(StrEnum):
@@ -35,17 +35,19 @@ class Ending(StrEnum):
 
     PREDICTED = "predicted"
     UNCHANGED = "unchanged"
-    FALLS = "falls"  # the model with its walks among the data expects none of its own gaits to walk
-    MOST = "most"  # as many as there may be
+    FALLS = "falls"  # with the walks among its data the model expects none of its own gaits to walk
+    MOST = "most"  # the limit of rounds is reached
 
 
 @dataclass(frozen=True)
 class Round:
-    """One gait that was not fitted: its speed over settled cycles as the model with `effects` predicts it and measured,
-    with the standard deviation of its repeats; `error_mm`, RMS of the ends' places against the prediction all along the
-    walk, `floor_mm`, what repeats differ by there (None: there is one only). `ended`: of the last round, why it is.
-    `at_edge`: whether the gait was sought for what is known of the model, not for a spread of 2 %; `interval_90_mm_s`,
-    `walks_probability`: as predicted; `inside`: whether the measured speed lies in the interval.
+    """Prediction and measurement of one gait that was not fitted.
+
+    predicted_mm_s, measured_mm_s: speed over settled cycles, by the model with `effects` and as measured; spread_mm_s:
+    standard deviation of the repeats. error_mm: RMS error of the ends' positions along the walk; floor_mm: their noise
+    floor, None for a single repeat. ended: in the last round, why there is no further one. at_edge: whether the gait
+    was sought for what is known of the model, not for a spread of 2 %. interval_90_mm_s, walks_probability: as
+    predicted. inside: whether the measured speed lies in the interval.
     """
 
     effects: tuple[str, ...]
@@ -63,21 +65,21 @@ class Round:
 
     @property
     def is_predicted(self) -> bool:
-        """Whether the speed is predicted to within what repeats differ by, or to half a per cent; repeats of which some
-        fell differ by what no prediction is excused with."""
+        """Whether the speed is predicted to within two standard deviations of the repeats, or to half a per cent. A
+        speed far below the prediction is not: the scatter of repeats of which some failed excuses no prediction."""
         error_mm_s = abs(self.predicted_mm_s - self.measured_mm_s)
         return self.measured_mm_s >= FELL * self.predicted_mm_s and error_mm_s <= max(
             2.0 * self.spread_mm_s, _PREDICTED * abs(self.measured_mm_s)
         )
 
     def changes_nothing(self, before: Round) -> bool:
-        """Whether the model still names the same and its gait walks no faster or slower, nor is predicted better."""
+        """Whether the model names the same effects as before and its gait is as fast and predicted no better."""
         as_fast = abs(self.measured_mm_s - before.measured_mm_s) < _UNCHANGED * before.measured_mm_s
         return self.effects == before.effects and as_fast and self.error_mm > 0.9 * before.error_mm
 
 
 def read_rounds(file: Path) -> list[dict[str, Any]]:
-    """The rounds as `again` wrote them; StageError where an earlier version did, which kept less."""
+    """Read the rounds that `again` wrote. Raises StageError if an earlier version, which recorded less, wrote them."""
     rounds = json.loads(file.read_text(encoding="utf-8"))
     known = {field.name for field in fields(Round)}
     if not rounds or any(known - set(one) for one in rounds):
@@ -86,7 +88,7 @@ def read_rounds(file: Path) -> list[dict[str, Any]]:
 
 
 def ending(rounds: Sequence[Round]) -> Ending | None:
-    """Why the rounds end with the last of these; None where they go on."""
+    """Return why the rounds end with the last of these; None if they go on."""
     if rounds[-1].is_predicted and rounds[-1].at_edge:
         return Ending.PREDICTED
     if len(rounds) > 2 and rounds[-1].changes_nothing(rounds[-2]):
@@ -96,10 +98,12 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 
 @dataclass(frozen=True)
 class Trades:
-    """What a round is made of: a diagnosis of all data, which suspects what was named before, gives the completed model
-    and what it names, an optimiser its gait, beginning from those walked before, or None where the model itself
-    expects it to fall, and the robot walks it into a data set; walk(number, model, gait, folder) numbers the rounds
-    from 2 on."""
+    """The steps of a round.
+
+    complete(dataset, suspected): diagnose all data, suspecting the effects named before; returns the completed model
+    and the effects named. optimize(model, walked): return its gait, starting also from those walked before, or None if
+    the model expects it not to walk. walk(number, model, gait, folder): walk it into a data set; rounds count from 2.
+    """
 
     complete: Callable[[Dataset, tuple[str, ...]], tuple[Model, tuple[str, ...]]]
     optimize: Callable[[Model, tuple[Gait, ...]], Gait | None]
@@ -107,7 +111,7 @@ class Trades:
 
 
 def judged(model: Model, effects: tuple[str, ...], walks: Dataset, at_edge: bool = False) -> Round:
-    """How well `model` predicts the repeats of one gait."""
+    """Judge how well `model` predicts the repeats of one gait."""
     trials = walks.trials
     prediction = prediction_of(model, trials[0])
     residuals = _residuals(model, trials)
@@ -131,8 +135,8 @@ def judged(model: Model, effects: tuple[str, ...], walks: Dataset, at_edge: bool
 
 
 def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
-    """Measured less predicted places of the ends that were tracked in mm, shape (repeats, ends, samples), on the
-    shortest's time base."""
+    """Measured minus predicted positions in mm of the tracked ends, shape (repeats, ends, samples), on the time base of
+    the shortest repeat."""
     places = [name for name in repeats[0].columns if name.startswith("displacement")]
     shortest = min(repeats, key=lambda trial: trial.time_s[-1])
     columns = predict(model, shortest)
@@ -142,16 +146,17 @@ def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
 
 
 def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...], trades: Trades) -> None:
-    """Go round until a gait that was never fitted is predicted, nothing changes any more, or after `ROUNDS` rounds.
+    """Repeat rounds until a gait at the edge is predicted, nothing changes, no gait is expected to walk, or `ROUNDS` is
+    reached.
 
-    `dataset`: all that informed model-completed.toml, less the walks in `inputs`, whose last gait is the first round's.
-    Writes rounds.json, the walks of further rounds (rounds/walks-2, ...), the last round's model and the fastest gait.
-    Rounds that an interrupted run has walked there are not walked again.
+    `dataset`: all data behind model-completed.toml; the walks in `inputs` are added, and those of the completed model's
+    gait are the first round. Writes rounds.json, the walks of further rounds (rounds/walks-2, ...), the last round's
+    model and the fastest gait. Rounds that an interrupted run has already walked are not walked again.
     """
     model, found = load_model(inputs / "model-completed.toml"), [load_gait(inputs / "gait-completed.toml")]
     walks = read_dataset(inputs / "walks-completed")
     base = read_dataset(inputs / "walks-base")
-    # the bench has walked the baseline, for another length of time
+    # the bench data already have walks of the baseline, of another length
     before = replace(base, trials=tuple(t for t in base.trials if Gait(**t.walked) != BASELINE))
     dataset = joined(dataset, before, "walks-1/")
     began = tuple({Gait(**trial.walked): None for trial in before.trials})
@@ -161,7 +166,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
         completed, named = trades.complete(dataset, effects)
-        # Where nothing is named any more fits have lost their way: what explained the bench is not given up for that.
+        # If nothing is named any more, the fits have gone wrong: the effects that explained the bench data are kept.
         if effects and not named:
             completed, named = model, effects
         folder = outputs / "rounds" / f"walks-{number}"

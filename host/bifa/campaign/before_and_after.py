@@ -1,5 +1,5 @@
-"""What a diagnosis comes to on its trials, before and after: errors in the units of the instruments, and where the
-residual lives."""
+"""Result of a diagnosis on its trials, before and after: errors in the instruments' units, and traces of the
+residuals."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from lacuna.diagnosis.residual_error import repeat_differences, rms
 from lacuna.estimation.fit import evaluate_on
 from lacuna.system import Channels
 
-_POINTS = 400  # of a trace, enough for a small figure
+_POINTS = 400  # points per trace, enough for a small figure
 
 
 def prediction_errors(found: Diagnosis) -> list[dict[str, Any]]:
-    """RMS error of each quantity on the trials that were fitted and on the held-out ones, by the base model and by the
-    final one, and the floor: the RMS of what repeats differ by, over the root of 2. Plain types."""
+    """RMS error of each quantity on the fitted and the held-out trials, for the base model and the final one, with the
+    noise floor: RMS difference of repeats over sqrt(2). Plain types."""
     known, held_out = found.final.problem.trials, found.split.not_fitted
     before, after = (fit.residuals() | evaluate_on(fit, held_out).residuals() for fit in (found.base, found.final))
     floors = repeat_differences(known, held_out, after)
@@ -43,8 +43,8 @@ def _only(quantity: str, channels: Channels) -> Channels:
 
 
 def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict[str, Any]]:
-    """For each held-out condition the channel whose residual shrank most, in standard deviations of the noise, under
-    the base model and the final one; thinned. Plain types. labels: what trials are called, by file."""
+    """Residuals of the base and the final model in each held-out condition, in standard deviations of the noise, on the
+    channel where they shrank most; thinned. Plain types. labels: names of trials, by file."""
     held_out = found.split.not_fitted
     before, after = evaluate_on(found.base, held_out), evaluate_on(found.final, held_out)
     shown, seen = [], set()

@@ -1,4 +1,4 @@
-"""The whole loop: measure, fit, walk, find what is missing, optimise with it, walk again, compare."""
+"""The stages of a campaign: measure, fit, walk, diagnose, optimise the completed model, walk again, compare."""
 
 import json
 from collections.abc import Collection
@@ -33,18 +33,18 @@ from lacuna.diagnosis.diagnose import Diagnosis, diagnose
 from lacuna.diagnosis.next_experiment import NextExperiment
 from lacuna.diagnosis.record import as_record
 
-BENCH_NAME = "campaign: characterisation"  # of its data set
-AT_EDGE = 0.05  # of the robots that may fall off
-_LIKELY = 0.5  # to walk: less, and a gait at the edge is not worth the robot's time
-_SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
-_FURTHER = 20  # and for walks of further rounds
+BENCH_NAME = "campaign: characterisation"  # name of the data set `bench`
+AT_EDGE = 0.05  # share of the robots that need not walk with a gait at the edge
+_LIKELY = 0.5  # gaits at the edge with a lower probability of walking are not tried
+_SEPARATING = 10  # stage numbers of the rig: experiments that separate confusable effects count from here,
+_FURTHER = 20  # and the walks of further rounds from here
 
 
 def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:
-    """The stages of a campaign on `setup`; `on_progress(what, share)` is told how the running stage is getting on.
+    """Return the stages of a campaign on `setup`; `on_progress(what, share)` reports the progress of the running stage.
 
-    By hand, only the stages that measure need the robot: a diagnosis there names the experiment that would separate
-    what it cannot tell apart, and the person decides.
+    With instruments worked by hand, only the stages that measure need the robot: the diagnosis names the experiment
+    that would separate effects it confuses, and leaves the decision to the person.
     """
     stages = [
         *_characterize(setup, effort, on_progress),
@@ -63,8 +63,8 @@ def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stag
 
 
 def _characterize(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:
-    """A real robot is measured without the known values that the person gives, which are declared afterwards: to
-    correct one is no reason to measure again."""
+    """On a real robot the person's known values are not part of the measurement; a second stage declares them, so that
+    correcting one does not require measuring again."""
     kept, trials = not setup.is_virtual, plan.session(quick=effort.quick)
     data, known = ("measured", {}) if kept else ("bench", dict(setup.known))
     on_trial = _unless_by_hand(setup, on_progress)
@@ -89,7 +89,7 @@ def _characterize(setup: Setup, effort: Effort, on_progress: OnProgress) -> list
 
 
 def _declare(setup: Setup) -> Stage:
-    """What the person knows goes before what the rig declares."""
+    """Add the values that the person knows, which take precedence over those that the rig declares."""
 
     def run(inputs: Path, outputs: Path) -> None:
         measured = read_dataset(inputs / "measured")
@@ -108,7 +108,7 @@ def _fit(setup: Setup, on_progress: OnProgress) -> Stage:
 
 
 def _optimize(which: str, walked: tuple[str, ...], setup: Setup, on_progress: OnProgress) -> Stage:
-    """The gait of the base or of the completed model; the search begins from the gaits `walked` before, too."""
+    """Find the gait of the base or the completed model; the search also starts from the gaits `walked` before."""
     model, gait = f"model-{which}.toml", f"gait-{which}.toml"
 
     def run(inputs: Path, outputs: Path) -> None:
@@ -122,9 +122,8 @@ def _optimize(which: str, walked: tuple[str, ...], setup: Setup, on_progress: On
 def _gait_of(
     robot: Model, setup: Setup, on_progress: OnProgress, walked: tuple[Gait, ...]
 ) -> tuple[Gait, dict[str, Any]]:
-    """The robust gait found with a model, and where it comes from. A base model that lacks much may have none that
-    walks, and neither may a robot whose bench shakes it: that ends no campaign, and the gait walked last stands in, or
-    the baseline."""
+    """Return the robust gait found with a model, and its provenance. A base model that lacks much, or a robot on a
+    shaking bench, may have no gait that walks; the gait walked last, or the baseline, then stands in for it."""
     try:
         best = found_gait(robot, setup.seed, SPREAD, on_progress, walked)
     except SearchError as error:
@@ -133,7 +132,7 @@ def _gait_of(
 
 
 def gait_at_edge(robot: Model, seed: int, on_progress: OnProgress, walked: tuple[Gait, ...]) -> Gait | None:
-    """The gait for what is known of the model; None where there is none or the model itself expects it to fall."""
+    """Find the gait for what is known of the model; None if there is none or the model expects it not to walk."""
     try:
         best = found_gait(robot, seed, None, on_progress, walked)
     except SearchError:
@@ -149,8 +148,8 @@ def found_gait(
     walked: tuple[Gait, ...] = (),
     naive: bool = False,
 ) -> Optimum:
-    """The gait that 19 of 20 robots of what is known walk with (`spread` None), or nine of ten of a spread. The search
-    begins from the baseline and from the other gaits `walked`, too."""
+    """Find the fastest gait for 19 in 20 robots drawn from what is known (`spread` None), or for nine in ten with the
+    relative `spread`. The search also starts from the baseline and from the gaits `walked` before."""
     share = QUANTILE if spread is not None else AT_EDGE
     with simulations() as runs:
         settings = Settings(seed=seed, spread=spread, naive=naive, share=share, begin=(BASELINE, *walked))
@@ -160,7 +159,7 @@ def found_gait(
 def _walk(
     which: str, gaits: dict[str, str | None], number: int, setup: Setup, effort: Effort, on_progress: OnProgress
 ) -> Stage:
-    """Walk gaits for as long as the model `which` takes to settle with them."""
+    """Walk gaits, each for as many cycles as the model `which` takes to settle with it."""
     name, walks, model = f"walk-{which}", f"walks-{which}", f"model-{which}.toml"
 
     def run(inputs: Path, outputs: Path) -> None:
@@ -203,7 +202,7 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
 
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
     settings = setup.settings(_SEPARATING)
-    measures = not (setup.is_virtual or setup.is_by_hand)  # the separating experiments, on a rig that needs nobody
+    measures = not (setup.is_virtual or setup.is_by_hand)  # the separating experiments, on an unattended rig
     return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings, by_hand=measures)
 
 
@@ -235,7 +234,7 @@ def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
 
 
 def _unless_by_hand(setup: Setup, on_progress: OnProgress) -> OnProgress:
-    """`on_progress`, but nobody where a person at the bench is asked things meanwhile."""
+    """`on_progress`, or no progress at all while a person at the bench is being prompted."""
     return (lambda what, share: None) if setup.is_by_hand else on_progress
 
 

@@ -1,4 +1,4 @@
-"""The report of a campaign: the answer first, then the evidence."""
+"""The report page of a campaign: the answer first, then the evidence."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ FILES = (
     ("summary.json", "figures"),
     ("provenance.json", "provenance"),
 )
-_MANY = 0.1  # of robots that do not walk: the report says so
+_MANY = 0.1  # share of robots that do not walk from which the report says so
 _LONGEST_S = 20.0  # of an animation
 
 
@@ -69,9 +69,10 @@ def campaign_page(
     robot: str,
     made: Sequence[tuple[str, str]],
 ) -> Page:
-    """The page of a campaign; summary, diagnosis and traces as in summary.json, diagnosis.json and residuals.json.
+    """Build the page of a campaign; summary, diagnosis and traces as in summary.json, diagnosis.json, residuals.json.
 
-    walks: a first repeat of each gait, by its name in the summary. robot: in words; made: date, command, versions.
+    walks: the first repeat of each gait, by the gait's name in the summary. robot: in words; made: date, command,
+    versions.
     """
     verdict = verdict_sentence(summary["verdict"], summary["effects"], summary["remainder"])
     sections = [
@@ -108,7 +109,7 @@ def _faster(gaits: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _bought(base_mm_s: float, completed_mm_s: float) -> str:
-    """What completing the model bought on this robot."""
+    """What completing the model gained on this robot."""
     if base_mm_s < STANDING_MM_S:
         return "With the gait found with the base model the robot stands still."
     gain = 100.0 * (completed_mm_s / base_mm_s - 1.0)
@@ -152,7 +153,7 @@ def _off(
 
 
 def walking(walks: Mapping[str, Walk]) -> ChartedSection:
-    """The walk that the base model misses by most, as predicted and as measured."""
+    """The walk for which the base model has the largest error, as predicted and as measured."""
     walk = most_missed(walks)
     svg, seconds, rate = motion_of(walk)
     shown_s = round(seconds * rate, 1)
@@ -170,12 +171,12 @@ def walking(walks: Mapping[str, Walk]) -> ChartedSection:
 
 
 def most_missed(walks: Mapping[str, Walk]) -> Walk:
-    """The walk at whose end the base model is furthest from the robot."""
+    """Return the walk at whose end the base model is furthest from the robot."""
     return max(walks.values(), key=lambda walk: abs(_miss_mm(walk, BASE)))
 
 
 def motion_of(walk: Walk, standalone: bool = False) -> tuple[str, float, float]:
-    """The animation of a walk: SVG, its length in seconds, and how many times as fast as life."""
+    """Animate a walk: return the SVG, its length in seconds, and its speed relative to real time."""
     lanes = {}
     for name in (BASE, MEASURED, COMPLETED):
         miss = "" if name == MEASURED else f", {_ahead(_miss_mm(walk, name))} at the end"
@@ -187,7 +188,7 @@ def motion_of(walk: Walk, standalone: bool = False) -> tuple[str, float, float]:
 
 
 def _miss_mm(walk: Walk, name: str) -> float:
-    """How far ahead of the robot a model is at the end."""
+    """Distance in mm by which a model is ahead of the robot at the end of the walk."""
     return float(walk.records[name]["displacement_head_mm"][-1] - walk.records[MEASURED]["displacement_head_mm"][-1])
 
 
@@ -231,14 +232,14 @@ def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSect
 
 _ENDED = {
     Ending.PREDICTED: "the speed of its gait is predicted to within the scatter of repeats, or to half a per cent",
-    Ending.UNCHANGED: "it names the same effects as the round before; its gait is as fast and predicted no better",
-    Ending.FALLS: "with its walks among the data, the model finds no further gait that it expects to walk",
+    Ending.UNCHANGED: "it names the same effects as the previous round; its gait is as fast and predicted no better",
+    Ending.FALLS: "with its walks added to the data, the model finds no further gait that it expects to walk",
     Ending.MOST: f"there are at most {ROUNDS} rounds, and the speed of its gait is still not predicted",
 }
 
 
 def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
-    """How well gaits were predicted that no fit had seen, round by round, and why the last round is the last."""
+    """How well gaits that were not fitted were predicted, round by round, and why the rounds ended."""
     rows = [
         [
             f"{number}, edge" if one["at_edge"] else str(number),
@@ -255,23 +256,23 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
         "of walking, and the positions of head and tail over the walk."
     )
     said = [
-        "A model is judged by its prediction of a gait that no fit has seen. Round 1 is the gait found with the "
-        "completed model for robots that differ by 2 %; the next one is sought for what is known of this robot, and so "
-        "is nearer the edge. If a speed is not predicted, or the robot falls off, its walks become data, the diagnosis "
-        "is repeated with all data, and the next round walks the gait of that model.",
+        "A model is judged by its prediction of a gait that was not fitted. Round 1 walks the gait found with the "
+        "completed model for robots whose parameters differ by 2 %; later gaits are sought for what is known of this "
+        "robot, and so are nearer the edge beyond which it does not walk. Between rounds the walks are added to the "
+        "data, the diagnosis is repeated with all data, and the next round walks the gait of the resulting model.",
         *(f"Round {number}: {_round_words(one)}." for number, one in enumerate(rounds, 1)),
-        f"It ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
+        f"The rounds ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
     ]
-    return ChartedSection("Gaits that no fit has seen", said, [PageTable(columns, rows, caption)])
+    return ChartedSection("Gaits that were not fitted", said, [PageTable(columns, rows, caption)])
 
 
 def _round_words(one: Mapping[str, Any]) -> str:
-    added = " and ".join(effect_words(name) for name in one["effects"]) or "nothing"
-    return f"the model has {added} added to it, its gait is {gait_words(one['gait'])}"
+    added = " and ".join(effect_words(name) for name in one["effects"]) or "no effect"
+    return f"the model includes {added}; its gait is {gait_words(one['gait'])}"
 
 
 def speed_table(gaits: Sequence[Mapping[str, Any]]) -> PageTable:
-    """Predicted and measured speeds of the gaits."""
+    """Table of the predicted and measured speeds of the gaits."""
     rows = [
         [
             _STAND_IN.format(gait["gait"]) if gait.get("stand_in") else _NAMES[gait["gait"]],
@@ -292,7 +293,7 @@ def _interval(prediction: Mapping[str, Any]) -> str:
 
 
 def prediction_table(errors: Sequence[Mapping[str, Any]], only: str | None = None) -> PageTable:
-    """Errors before and after in the units of the instruments, against the floor; `only`: "fitted" or "held-out"."""
+    """Table of errors before and after, in the instruments' units, with the floor; `only`: "fitted" or "held-out"."""
     rows = []
     for error in errors:
         if only in (None, error["trials"]):
@@ -302,6 +303,6 @@ def prediction_table(errors: Sequence[Mapping[str, Any]], only: str | None = Non
 
 
 def errors_in_words(error: Mapping[str, Any]) -> list[str]:
-    """An error in its instrument's unit, for `ERROR_COLUMNS`."""
+    """Format an error in its instrument's unit, one text for each of `ERROR_COLUMNS`."""
     sides = ("before", "after", "noise_floor")
     return [f"{plain(error[side])}{NBSP}{unit_of(error['quantity'])}" for side in sides]

@@ -1,4 +1,4 @@
-"""Progress of a campaign for people: one line a stage, a bar for the stage that runs."""
+"""Progress of a campaign on the terminal: one line per stage, a bar for the running one."""
 
 from rich.progress import BarColumn, Progress, TaskID, TimeElapsedColumn
 from rich.table import Column
@@ -10,10 +10,10 @@ _TITLE = 35  # characters: the longest title of a stage
 
 
 class StageProgress:
-    """Bars that redraw themselves on a terminal and end as plain lines elsewhere: use it in `contextlib.closing`. Hand
-    `start` and `end` to `run_stages`, `update` to what happens inside a stage.
+    """Progress bars that are redrawn on a terminal and printed as plain lines elsewhere. Use in `contextlib.closing`;
+    pass `start` and `end` to `run_stages`, and `update` to whatever runs inside a stage.
 
-    While a person measures there is no bar, which would redraw itself over questions and answers: `close` it before.
+    `close` it before a person is prompted: a bar would be redrawn over questions and answers.
     """
 
     def __init__(self, console: Console) -> None:
@@ -35,7 +35,7 @@ class StageProgress:
         self._bars = bars = Progress(
             words("{task.description}", table_column=Column(min_width=min(_TITLE, wide // 3), no_wrap=False)),
             BarColumn(bar_width=min(20, wide // 8)),
-            words("{task.fields[what]}", table_column=Column(no_wrap=False)),  # where it is narrow, the words yield
+            words("{task.fields[what]}", table_column=Column(no_wrap=False)),  # wraps on a narrow terminal
             TimeElapsedColumn(),
             console=self._console,
         )
@@ -44,12 +44,12 @@ class StageProgress:
         return bars
 
     def update(self, what: str, share: float) -> None:
-        """`what` inside the running stage is done to `share`, 0 to 1."""
+        """The step `what` of the running stage is done to `share`, 0 to 1."""
         bars = self._bars or self._begin()
         bars.update(self._task, total=1.0, completed=min(share, 0.999), what=what)
 
     def end(self, stage: Stage, ran: bool) -> None:
-        """A stage is done; ran: it was not up to date already."""
+        """A stage has ended; ran: whether it had to run or was already up to date."""
         said = "done" if ran else "up to date"
         if self._bars is None:
             self._console.print(f"{stage.title}: {said}")

@@ -1,4 +1,4 @@
-"""Run the experiment that tells apart what a diagnosis could not, and diagnose again."""
+"""Run the experiment that separates effects a diagnosis could not, and diagnose again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.next_experiment import NextExperiment
 
 ROUNDS = 3
-SPECIMEN = ("sealed", "profile", "effects", "parameters")  # of a virtual rig: what makes it the same robot again
+SPECIMEN = ("sealed", "profile", "effects", "parameters")  # options of a virtual rig that determine which robot it is
 _WALK_CYCLES = 4
 
 
@@ -30,12 +30,12 @@ def resolve(
     on_progress: OnProgress = lambda what, share: None,
     record: Recorder | None = None,
 ) -> tuple[Dataset, Diagnosis, tuple[NextExperiment, ...]]:
-    """As long as `found` names an experiment that separates what it confuses, run that and diagnose again: until the
-    set is one, nothing on offer separates it, or after `ROUNDS` experiments.
+    """As long as `found` names an experiment that separates the effects it confuses, run it and diagnose again, up to
+    `ROUNDS` times. This ends when one explanation is left or no available experiment separates them.
 
-    open_rig(n) gives the rig for experiment number n, from 1 on; its data set goes to `folder`/separate-n.
-    diagnose(dataset, suspected) suspects what was named before and what it was confused with. Returns all trials as
-    one data set, the last diagnosis, and the experiments that were run.
+    open_rig(n) opens the rig for experiment n, counted from 1; its data set goes to `folder`/separate-n.
+    diagnose(dataset, suspected): `suspected` are the effects named before and those they were confused with. Returns
+    all trials as one data set, the last diagnosis, and the experiments that were run.
     """
     ran: list[NextExperiment] = []
     for number in range(1, ROUNDS + 1):
@@ -60,13 +60,13 @@ def resolve(
 
 
 def refuse_leftovers(folder: Path) -> None:
-    """Raise DatasetError where an earlier `resolve` has left an experiment, before minutes are spent on a diagnosis."""
+    """Raise DatasetError if an earlier `resolve` left an experiment, before minutes are spent on a diagnosis."""
     if left := sorted(path.name for path in folder.glob("separate-*") if path.suffix != ".partial"):
-        raise DatasetError(f"{folder} holds {', '.join(left)} of an earlier --resolve: move that folder away first")
+        raise DatasetError(f"{folder} holds {', '.join(left)} from an earlier --resolve: move that folder away first")
 
 
 def planned(chosen: NextExperiment) -> tuple[PlannedTrial, ...]:
-    """The chosen experiment as trials of a session, with its repeats."""
+    """Return the trials of the chosen experiment, repeats included."""
     settings = chosen.settings
     if chosen.experiment is None:
         raise ValueError("no experiment was chosen")
@@ -79,7 +79,7 @@ def planned(chosen: NextExperiment) -> tuple[PlannedTrial, ...]:
 
 
 def joined(first: Dataset, second: Dataset, prefix: str) -> Dataset:
-    """Both data sets' trials as one day: the second's come later, under names of their own."""
+    """Join the trials of two data sets into one session; those of the second come later and get the prefix."""
     last = max((t.session_order or 0 for t in first.trials), default=0)
     later = tuple(
         replace(

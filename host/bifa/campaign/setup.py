@@ -1,4 +1,4 @@
-"""Where a campaign runs (a rig, opened for every stage that measures) and how much it measures; both in words."""
+"""Settings of a campaign: the rig it runs on, opened for every stage that measures, and how much it measures."""
 
 import shlex
 from collections.abc import Mapping
@@ -19,10 +19,10 @@ class Effort:
 
 @dataclass(frozen=True)
 class Setup:
-    """`port` as for `--port`; `options` go to a virtual rig. Every stage draws its own noise.
+    """The rig of a campaign. port: as for `--port`; options: of a virtual rig. Every stage draws its own noise.
 
-    `known`: what the person has measured directly, in place of what the rig declares (`bifa.measure.bench_file`).
-    `hands`: on a serial port, whose rig has no instruments, the person who works the lab's own.
+    known: values that the person has measured directly, which override those the rig declares
+    (`bifa.measure.bench_file`). hands: the person who works the lab's instruments; a serial port has none of its own.
     """
 
     port: str = "virtual"
@@ -33,21 +33,21 @@ class Setup:
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether a person works the instruments: the port is not that of a rig that brings its own."""
+        """Whether a person works the instruments: the port is not a rig with instruments of its own."""
         return not is_offered(self.port)
 
     @property
     def is_virtual(self) -> bool:
-        """Whether the robot is simulated, so that it has seeds and a seal. On a real one nothing is measured again
-        unless asked, and earlier data are kept next to the new."""
+        """Whether the robot is simulated and so has seeds and a seal. A real one is measured again only on request, and
+        earlier data are kept next to the new."""
         return self.port == "virtual"
 
     def open(self, stage: int) -> Rig:
-        """The rig for stage number `stage`."""
+        """Open the rig for stage number `stage`."""
         return open_rig(self.port, **self._options(stage))
 
     def settings(self, stage: int) -> dict[str, object]:
-        """What decides the stage's data, for its provenance."""
+        """Settings that decide the stage's data, for its provenance."""
         if self.is_by_hand:  # the port's name changes from day to day
             return {"port": "serial", "instruments": "by hand"}
         return {"port": self.port, **self._options(stage)}
@@ -57,9 +57,9 @@ class Setup:
 
 
 def about(setup: Setup, effort: Effort) -> tuple[str, list[tuple[str, str]]]:
-    """The robot in words, and how the campaign was made; the same for the same settings."""
+    """Describe the robot and how the campaign was made; the same settings give the same text."""
     words = ["bifa", "campaign", "--port", setup.port]
-    if setup.is_virtual or setup.seed:  # which seeds searches and the diagnosis on any rig
+    if setup.is_virtual or setup.seed:  # the seed of searches and diagnosis counts on any rig
         words += ["--seed", str(setup.seed)]
     if "profile" in setup.options:
         words += ["--profile", str(setup.options["profile"])]

@@ -1,4 +1,4 @@
-"""Several campaigns beside one another: models, verdicts and gaits."""
+"""Several campaigns side by side: models, verdicts and gaits."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from bifa.robot.gait import Gait, load_gait
 from bifa.robot.parameters import ModelParameter
 
 _SHADES = {"baseline": "quiet", "base": "before", "completed": "after"}
-_APART = 2.0  # standard deviations of the difference: parameters that differ by more stand out
+_APART = 2.0  # standard deviations: parameters that differ by more are marked
 
 
 class CompareError(BifaError):
-    """A folder is no finished campaign, or there is only one."""
+    """A folder holds no finished campaign, or there are fewer than two."""
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A finished campaign. models: "base" and "completed"; gaits: by name, the baseline not among them."""
+    """A finished campaign. models: "base" and "completed"; gaits: by name, without the baseline."""
 
     name: str
     summary: Mapping[str, Any]
@@ -49,9 +49,9 @@ class Campaign:
 
 
 def read_runs(folders: Sequence[Path]) -> list[Campaign]:
-    """The campaigns in these folders, each by its folder's name, or by its path where names are equal."""
+    """Read the campaigns in these folders, named after them, or by their paths if two names are equal."""
     if len(folders) < 2:
-        raise CompareError("compare takes two campaigns or more: bifa compare out/monday out/tuesday")
+        raise CompareError("compare needs two campaigns or more: bifa compare out/monday out/tuesday")
     names = [folder.resolve().name for folder in folders]
     if len(set(names)) < len(names):
         names = [str(folder) for folder in folders]
@@ -74,7 +74,7 @@ def _read(name: str, folder: Path) -> Campaign:
 
 
 def compare_page(runs: Sequence[Campaign]) -> Page:
-    """All of it as a page."""
+    """Build the page that compares the campaigns."""
     return Page(
         f"{len(runs)} campaigns side by side",
         _lead(runs),
@@ -88,8 +88,8 @@ def compare_page(runs: Sequence[Campaign]) -> Page:
             ChartedSection(
                 "Models",
                 [
-                    "Parameters as fitted with what was found in the model; ≠ marks those that differ between two "
-                    "runs by more than their uncertainties allow."
+                    "Parameters of the completed models; ≠ marks those that differ between two runs by more than "
+                    "their uncertainties allow."
                 ],
                 [parameter_table(runs)],
             ),
@@ -105,11 +105,11 @@ def _lead(runs: Sequence[Campaign]) -> str:
     speed, gait, where = max((_speed(run, gait), gait, run.name) for run in runs for gait in GAIT_NAMES)
     walks = f"The fastest gait ({GAIT_NAMES[gait]}) walks {speed:.2f} mm/s, in {where}."
     if not any(found.values()):
-        return f"No effect was named in any of them. {walks}"
+        return f"None of them named an effect. {walks}"
     if all(names == shared for names in found.values()):
         return f"All found the same: {_names(shared)}. {walks}"
     if shared:
-        return f"All found {_names(shared)}, and some more. {walks}"
+        return f"All found {_names(shared)}; some found more. {walks}"
     return f"They found different effects. {walks}"
 
 
@@ -126,7 +126,7 @@ def _speed(run: Campaign, gait: str) -> float:
 
 
 def verdict_table(runs: Sequence[Campaign]) -> PageTable:
-    """What each found."""
+    """Table of each campaign's verdict."""
     rows = []
     for run in runs:
         named = "; ".join(effect_words(e["name"], e["parameters"]) for e in run.summary["effects"])
@@ -135,13 +135,13 @@ def verdict_table(runs: Sequence[Campaign]) -> PageTable:
 
 
 def speed_table(runs: Sequence[Campaign]) -> PageTable:
-    """Measured speeds of the gaits."""
+    """Table of the gaits' measured speeds."""
     rows = [[run.name, *(f"{_speed(run, gait):.2f}" for gait in GAIT_NAMES)] for run in runs]
     return PageTable(["measured speed, mm/s", *GAIT_NAMES.values()], rows)
 
 
 def error_table(runs: Sequence[Campaign]) -> PageTable:
-    """Errors on held-out trials, before and after, in the units of the instruments."""
+    """Table of errors on held-out trials, before and after, in the instruments' units."""
     rows = [
         [f"{run.name}: {channel_words(error['quantity'])}", *errors_in_words(error)]
         for run in runs
@@ -152,7 +152,7 @@ def error_table(runs: Sequence[Campaign]) -> PageTable:
 
 
 def parameter_table(runs: Sequence[Campaign]) -> PageTable:
-    """The completed models' parameters; those that differ by more than their uncertainties are marked."""
+    """Table of the completed models' parameters; those that differ by more than their uncertainties are marked."""
     models = [run.models["completed"] for run in runs]
     rows = []
     for name, parameter in models[0].parameters.items():
@@ -178,7 +178,7 @@ def _differ(parameters: Sequence[ModelParameter]) -> bool:
 
 
 def gait_table(runs: Sequence[Campaign], which: str) -> PageTable:
-    """The parameters of the gaits found with the "base" or the "completed" model."""
+    """Table of the parameters of the gaits found with the "base" or the "completed" model."""
     gaits = [run.gaits[which].as_dict() for run in runs]
     rows = [[gait_parameter_words(name), *(plain(gait[name], 3) for gait in gaits)] for name in gaits[0]]
     return PageTable([f"gait {GAIT_NAMES[which]}", *(run.name for run in runs)], rows)

@@ -1,8 +1,8 @@
-"""Stages of a campaign: each makes named artefacts from named artefacts, can be resumed and rerun alone.
+"""Stages of a campaign: each makes named artefacts from named artefacts and can be resumed or rerun on its own.
 
-A stage works in a scratch folder; only when it has succeeded are its artefacts moved to their names.
-`provenance.json` says of every artefact which stage, settings, inputs and version made it; a stage whose
-record still holds is not run again, and what is not on record is never replaced.
+A stage works in a scratch folder; its artefacts are moved to their final names only once it has succeeded.
+`provenance.json` records which stage, settings, inputs and version made each artefact. A stage whose record still
+matches is not run again, and files without a record are never replaced.
 """
 
 import glob
@@ -22,15 +22,15 @@ from bifa.lock import locked
 from bifa.printable import counted
 from bifa.toml import parse_toml
 
-OnProgress = Callable[[str, float], None]  # what the running stage is at, and the share of that done, 0 to 1
+OnProgress = Callable[[str, float], None]  # current step of the running stage, and the share of it done, 0 to 1
 
 PROVENANCE = "provenance.json"
 _SCRATCH = ".scratch"
-_ASKED = "asked.json"  # in the scratch: what the stage was begun with, and what it made once it has ended
+_ASKED = "asked.json"  # in the scratch folder: what the stage was started with and, once it has ended, what it made
 
 
 class StageError(BifaError):
-    """A stage cannot run: an artefact that it needs is missing, or it did not make what it promised."""
+    """A stage cannot run, would replace something not on record, or did not make its artefacts."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class Stage:
     needs, makes: names of artefacts (files or folders, relative to the campaign's folder).
     run(inputs, outputs): `inputs` is the campaign's folder, `outputs` the scratch folder to write `makes` into.
     settings: whatever else decides the result (seed, gait, port); plain JSON.
-    resumes: `run` goes on with what an interrupted run left in `outputs`, which is then kept; it writes none of `makes`
-    before it is complete, and is not called where all are there.
-    by_hand: a real robot was measured for hours to make it. It is not run again for another version of bifa; with
-    other settings, or where what it made has been changed, only on request; and what it made before is kept beside.
+    resumes: `run` continues from what an interrupted run left in `outputs`, which is kept for that purpose. It writes
+    each of `makes` only when complete, and is not called if all of them exist.
+    by_hand: its artefacts take hours of measuring a real robot. The stage is not rerun for another version of bifa, and
+    only on request if settings or artefacts have changed; earlier artefacts are kept next to the new ones.
     """
 
     name: str
@@ -58,8 +58,8 @@ class Stage:
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file, or of a folder's files with their names, in order: of a data set those that it lists, with the
-    instruments' own records of them; nowhere what an operating system or an office program leaves behind."""
+    """SHA-256 of a file, or of a folder's files and their names, sorted. Of a data set only the files it lists and the
+    instruments' raw records of them count; files left by operating systems or office programs never do."""
     if path.is_dir():
         lines = (f"{file.relative_to(path).as_posix()}\0{digest(file)}\n" for file in sorted(_that_count(path)))
         return hashlib.sha256("".join(lines).encode()).hexdigest()
@@ -68,12 +68,12 @@ def digest(path: Path) -> str:
 
 
 def _that_count(folder: Path) -> list[Path]:
-    from bifa.data.layout import RAW, TABLE_FILE  # numpy comes with it: errors of usage do not wait for that
+    from bifa.data.layout import RAW, TABLE_FILE  # imports numpy, which usage errors need not wait for
 
     files = [path for path in folder.rglob("*") if path.is_file() and not is_stray(path.name)]
     try:
         listed = [trial["file"] for trial in parse_toml((folder / TABLE_FILE).read_text("utf-8"))["trial"]]
-    except (OSError, ValueError, KeyError, TypeError):  # no data set, or one that is read, and refused, elsewhere
+    except (OSError, ValueError, KeyError, TypeError):  # no valid data set: reading it reports why
         return files
     raw = tuple(Path(file).stem for file in listed)
     return [
@@ -86,7 +86,7 @@ def _that_count(folder: Path) -> list[Path]:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise StageError where `folder` is a data set, among whose files a campaign has no place."""
+    """Raise StageError if `folder` is a data set, since a campaign must not write among its files."""
     if (folder / "dataset.toml").exists():
         raise StageError(f"{folder} is a data set; choose another folder for the campaign")
 
@@ -101,10 +101,10 @@ def run_stages(
 ) -> None:
     """Bring every stage's artefacts up to date, in the order given.
 
-    A stage runs where it is named in `rerun`, or its artefacts, inputs, settings or bifa's version are not
-    those on record. on_end(stage, ran) says whether it ran. Raises StageError, before any stage runs where
-    something that a stage would replace is not on record; an error inside a stage leaves the artefacts of earlier
-    runs as they were. Raises LockedError where another program runs stages in `folder`.
+    A stage runs if it is named in `rerun`, or if its artefacts, inputs, settings or bifa's version are not those on
+    record. on_end(stage, ran) reports whether it ran. Raises StageError, before any stage runs if a stage would replace
+    something that is not on record; an error inside a stage leaves the artefacts of earlier runs untouched. Raises
+    LockedError if another program is running stages in `folder`.
     """
     names, again = [stage.name for stage in stages], set(rerun)
     if unknown := again.difference(names):
@@ -113,7 +113,7 @@ def run_stages(
     with locked(folder):
         folder.mkdir(parents=True, exist_ok=True)
         records = _read_records(folder)
-        for stage in stages:  # another version's stages may have made the same
+        for stage in stages:  # stages of another version may have made the same artefacts
             theirs = {name: record for name, record in records.items() if name == stage.name or name not in names}
             _refuse_unrecorded(folder, stage, theirs)
         shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
@@ -127,7 +127,7 @@ def run_stages(
 
 
 def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict[str, Any]]) -> None:
-    """StageError where the stage would replace what none of these records say was made by a stage."""
+    """Raise StageError if the stage would replace something that, by these records, no stage has made."""
     made = {name for record in records.values() for name in record.get("artefacts", {})}
     for path in (folder / name for name in stage.makes if name not in made):
         if path.exists() or path.is_symlink():
@@ -171,7 +171,7 @@ def _holds(folder: Path, stage: Stage, asked: dict[str, Any], record: dict[str, 
 
 
 def _differing(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Settings that both know and that differ, in words; another version may have more or fewer."""
+    """Describe the settings that both contain and that differ; another version may have more or fewer."""
     found = []
     for name in old.keys() & new.keys():
         if isinstance(old[name], Mapping) and isinstance(new[name], Mapping):
@@ -182,8 +182,8 @@ def _differing(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
 
 
 def _run(folder: Path, stage: Stage, asked: dict[str, Any], records: dict[str, Any]) -> None:
-    """Run the stage and move what it makes to its place. On record first: an interruption between the two then leaves
-    nothing in the folder that is not on record, and the digests say that it is not yet what they promise."""
+    """Run the stage, record its artefacts, and move them into place, in this order: an interruption in between then
+    leaves nothing in the folder that is not on record, and the digests show that the artefacts are not in place yet."""
     scratch = _unfinished(folder, stage)
     begun = _resumed(scratch, stage, asked)
     scratch.mkdir(exist_ok=stage.resumes)
@@ -207,11 +207,12 @@ def _unfinished(folder: Path, stage: Stage) -> Path:
 
 
 def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, Any]:
-    """What the scratch to go on with was begun with, empty for a new one. Begun with something else it is deleted, as
-    is what is left after all was moved; StageError where it was begun by hand with something else."""
+    """Return what the scratch folder to resume was started with; empty for a new one. If that differs from what is now
+    asked for, StageError is raised for a stage done by hand; otherwise the folder is deleted, as is one whose artefacts
+    were all moved."""
     if not stage.resumes or not scratch.exists():
         return {}
-    asked_before = scratch / _ASKED  # not there after an earlier version, or an interruption at the very beginning
+    asked_before = scratch / _ASKED  # missing after an earlier version, or an interruption at the very start
     begun = dict(json.loads(asked_before.read_text(encoding="utf-8"))) if asked_before.exists() else {}
     moved = "artefacts" in begun and not any((scratch / name).exists() for name in stage.makes)
     if moved or not (stage.by_hand or {key: begun.get(key) for key in asked} == asked):
@@ -231,21 +232,21 @@ def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, An
 
 
 def trials_in(scratch: Path) -> int:
-    """How many trials an interrupted stage has left in its scratch folder."""
-    from bifa.data.write import PARTIAL_SUFFIX  # numpy comes with it: errors of usage do not wait for that
+    """Number of trials that an interrupted stage left in its scratch folder."""
+    from bifa.data.write import PARTIAL_SUFFIX  # imports numpy, which usage errors need not wait for
 
     return len(list(scratch.glob(f"**/*{PARTIAL_SUFFIX}/*.csv")))
 
 
 def _made_before(folder: Path, scratch: Path, stage: Stage, begun: Mapping[str, Any]) -> dict[str, str]:
-    """What an earlier run made and did not come to move, or not all; empty where there is none."""
+    """Digests of what an earlier run made but did not finish moving; empty if there is nothing."""
     made = begun.get("artefacts", {})
     here = all((scratch / name).exists() or (folder / name).exists() for name in stage.makes)
     return made if here and set(stage.makes) == set(made) else {}
 
 
 def _made(folder: Path, scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, str]:
-    """Run the stage, unless an interrupted run has made all there is to make; the digests of that."""
+    """Run the stage, unless an interrupted run has made all artefacts; return their digests."""
     _write_json(scratch / _ASKED, asked)
     if _missing(scratch, stage):
         stage.run(folder, scratch)
@@ -270,7 +271,7 @@ def _replace(new: Path, target: Path, keep: bool) -> None:
 
 
 def _earlier(target: Path) -> Path:
-    """The name that `target` is kept under: numbered one more than the last, though some before may be gone."""
+    """Name under which `target` is kept: numbered one above the highest, even if lower numbers are missing."""
     there = target.parent.glob(f"{glob.escape(target.name)}.earlier-*")
     numbers = [path.name.rpartition("-")[2] for path in there]
     last = max((int(number) for number in numbers if number.isdecimal()), default=0)

@@ -1,4 +1,4 @@
-"""What a campaign comes to: speeds predicted and measured, errors before and after, report (the stage `compare`)."""
+"""Summary of a campaign: predicted and measured speeds, errors before and after, report (the stage `compare`)."""
 
 import json
 import platform
@@ -35,7 +35,7 @@ PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3, "edge": 23.3}
 
 
 def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stage:
-    """The stage that makes `summary.json`, `report.html`, its two main figures and the walk that moves.
+    """Return the stage that makes `summary.json`, `report.html`, its two main figures and the animated walk.
 
     robot: in words; made: how the campaign was made, for the report."""
     needs = ["bench", "model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "rounds.json"]
@@ -90,16 +90,16 @@ def _run(robot: str, made: Sequence[tuple[str, str]], inputs: Path, outputs: Pat
 
 
 def _edge(inputs: Path) -> Sequence[Trial]:
-    """The walks of the last round, if its gait was sought at the edge of what is known."""
+    """Walks of the last round, if its gait was sought at the edge of what is known."""
     rounds = read_rounds(inputs / "rounds.json")
     last = inputs / "rounds" / f"walks-{len(rounds)}"
     return read_dataset(last).trials if rounds[-1]["at_edge"] and last.exists() else []
 
 
 def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -> dict[str, Any]:
-    """Speeds in mm/s over the settled cycles, of which `settled_cycles` were measured in all; `spread` is that of the
-    repeats. `interval_90_mm_s`, `walks_probability`: what the completed model predicts, at the edge that of the last
-    round. `stand_in`: the baseline, since no gait walks on the model."""
+    """Speeds in mm/s over the settled cycles of a gait. spread: standard deviation of the repeats. settled_cycles:
+    number measured in all. interval_90_mm_s, walks_probability: predicted by the model `completed`, at the edge that of
+    the last round. stand_in: the baseline was walked because no gait walks on the model."""
     measured, trial = [speed_of(one) for one in trials], trials[0]
     means = [speed.mean_mm_s for speed in measured]
     prediction = prediction_of(completed, trial)
@@ -118,7 +118,7 @@ def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -
 
 
 def _when(measured: Dataset) -> list[tuple[str, str]]:
-    """When the data was measured, by its files, and by which firmware."""
+    """When the data were measured, by the date of the file, and with which firmware."""
     day = datetime.fromtimestamp((measured.folder / "dataset.toml").stat().st_mtime).date().isoformat()
     firmware = measured.provenance.get("firmware")
     return [("measured", day), *([("firmware", str(firmware))] if firmware else [])]
@@ -129,7 +129,7 @@ def _versions() -> tuple[str, str]:
 
 
 def _robustness(model: Model, gaits: Mapping[str, Gait]) -> dict[str, list[float]]:
-    """Speeds in mm/s of every gait on robots that differ from the model by `SPREAD` in each parameter, sorted."""
+    """Sorted speeds in mm/s of each gait on robots whose parameters differ from the model by `SPREAD`."""
     robots = spread_of(model, SPREAD).plants(model, _ROBOTS, 0)
     with simulations() as runs:
         speeds = distribution(runs, robots, gait_rows(list(gaits.values())), Metric())

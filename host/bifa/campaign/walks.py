@@ -1,4 +1,4 @@
-"""Walk gaits on a rig and compare what was measured with what the model predicts."""
+"""Walk gaits on a rig and compare the measurements with the model's predictions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -31,10 +31,10 @@ def measure_walks(
     on_progress: OnProgress = lambda what, share: None,
     record: Recorder | None = None,
 ) -> Dataset:
-    """Walk every gait `repeats` times on the rig for as many `cycles`, or for its own, into the data set `folder`,
-    whose files are named after the gaits; walks that an interrupted run has left there are not walked again.
+    """Walk every gait `repeats` times on the rig, for `cycles` cycles (one number, or one for each gait), into the data
+    set `folder`, whose files are named after the gaits. Walks left there by an interrupted run are not repeated.
 
-    record: None, where the rig needs nobody: a walk that has not settled is then walked again for twice as long, up to
+    record: None on an unattended rig; a walk that has not settled is then repeated for twice as long, up to
     `MOST_CYCLES`.
     """
     each = cycles if isinstance(cycles, Mapping) else dict.fromkeys(gaits, cycles)
@@ -54,7 +54,7 @@ def measure_walks(
 
 
 def _until_settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
-    """The `Recorder` of a rig that needs nobody, until the walk has settled, or has lasted long enough for that."""
+    """`Recorder` of an unattended rig: repeat the walk for longer until it has settled or lasts `MOST_CYCLES`."""
     while True:
         trial = unattended(rig, uno, planned, on_progress)
         short = planned.cycles < LEAST
@@ -64,34 +64,34 @@ def _until_settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Calla
 
 
 def planned_cycles(model: Model, gait: Gait, least: int) -> int:
-    """How many cycles to walk, as the model predicts: near the edge a robot may hardly move for several cycles
-    before it walks, so that the first ones say nothing; one that never settles may fall after many."""
+    """Number of cycles to walk, at least `least`, by the model's prediction: near the edge a robot may hardly move for
+    several cycles before it walks, so the first ones say little; one that never settles may fail after many."""
     if not settles(model):
         return MOST_CYCLES
     return int(np.clip(predict_speed(model, spread_of(model), gait).cycles, least, MOST_CYCLES))
 
 
 def speed_of(trial: Trial) -> MeasuredSpeed:
-    """What was measured in one walk."""
+    """Measured speed of one walk."""
     return measured_speed(trial.time_s, trial.columns["displacement_head_mm"], trial.walked["period_s"])
 
 
 def walks_of(gait: Gait, dataset: Dataset) -> list[Trial]:
-    """The trials that walked `gait`."""
+    """Trials of the data set that walked `gait`."""
     return [trial for trial in dataset.trials if trial.gait == gait.as_dict()]
 
 
 def prediction_of(model: Model, trial: Trial, naive: bool = False) -> Prediction:
-    """The model's prediction of the walk in `trial`, of which only the length and the clock's rate are used; naive:
-    from its covariance alone."""
+    """Predict the walk in `trial`, of which only the gait, the length and the clock rate are used; naive: from the
+    model's covariance alone."""
     known, gait = spread_of(model), Gait(**trial.walked)
-    cycles = max(complete_cycles(trial.time_s, gait.period_s), LEAST)  # fewer have no speed, as `speed_of` says
+    cycles = max(complete_cycles(trial.time_s, gait.period_s), LEAST)  # with fewer, `speed_of` raises
     rate = seconds_per_uno_s(trial)
     return predict_speed(model, known.naive if naive else known, gait, cycles=cycles, clock_rate=rate)
 
 
 def predict(model: Model, trial: Trial) -> dict[str, Any]:
-    """The model's own record of the walk that `trial` holds, on the trial's clock: the same columns."""
+    """Simulate the walk in `trial` with the model: the same columns, on the trial's clock."""
     gait = Gait(**trial.walked)
     commands = valves_of(of_gait(gait, trial.time_s[-1] + gait.period_s), trial)
     columns = walk(model, commands=commands, time_s=trial.time_s * seconds_per_uno_s(trial)).columns

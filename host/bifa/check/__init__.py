@@ -1,4 +1,4 @@
-"""What `bifa check` finds in a well-formed data set: defects of the recordings, and mistakes made in the lab."""
+"""The checks of `bifa check` on a well-formed data set: defects of recordings, and mistakes made in the lab."""
 
 from bifa.data import Dataset, Trial
 
@@ -10,10 +10,10 @@ __all__ = ["Finding", "check_dataset", "check_trial"]
 
 
 def check_dataset(dataset: Dataset) -> list[Finding]:
-    """Every finding in a data set: defects first."""
+    """Return all findings in a data set, defects first."""
     return check_recordings(dataset) + check_plausibility(dataset)
 
 
 def check_trial(trial: Trial) -> list[Finding]:
-    """Every finding in one trial by itself: defects first."""
+    """Return all findings in a single trial, defects first."""
     return check_recording(trial) + check_trial_plausibility(trial)

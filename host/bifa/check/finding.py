@@ -1,17 +1,17 @@
-"""What a check found; what is found alike in several trials is said once, with the range of the numbers that differ."""
+"""Findings of the checks. Similar findings in several trials are merged, with the range of the numbers that differ."""
 
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-LEAST = 3  # findings that are gathered
-_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)")  # by itself: not those in a file's name
+LEAST = 3  # smallest number of findings that are merged
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)")  # separate numbers, not those in a file's name
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing to look at. `file` is None where it concerns the whole data set, several `files`, or the repeats of one
-    `condition`; `line` is that of the CSV file."""
+    """One result of a check. `file` is None if it concerns the whole data set, several `files`, or the repeats of one
+    `condition`; `line` is a line of the CSV file."""
 
     kind: str
     text: str
@@ -23,7 +23,7 @@ class Finding:
 
     @property
     def place(self) -> str:
-        """The file with its line, or the condition; empty where it concerns the whole data set."""
+        """The file with its line, or the condition; empty if the finding concerns the whole data set."""
         if self.condition:
             return self.condition
         return ", ".join(part for part in (self.file, f"line {self.line}" if self.line else None) if part)
@@ -35,7 +35,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Gathered:
-    """`text`, as a person reads it; `places`: where, one for each finding that was gathered, none for one by itself."""
+    """Merged findings: the `text` shown to the user, and the `places` of the findings (empty for a single one)."""
 
     kind: str
     text: str
@@ -43,7 +43,7 @@ class Gathered:
 
 
 def gathered(findings: Sequence[Finding]) -> Iterator[Gathered]:
-    """What is alike but for its numbers and its place, together; in the order of the first of each."""
+    """Merge findings that differ only in numbers and place; yields them in order of first appearance."""
     alike: dict[tuple[str, str | None, str], list[Finding]] = {}
     for finding in findings:
         alike.setdefault((finding.kind, finding.column, _NUMBER.sub("", finding.text)), []).append(finding)
@@ -62,7 +62,7 @@ def _count(group: Sequence[Finding]) -> str:
 
 
 def _in_one(texts: Sequence[str]) -> str:
-    """The sentence that these are but for their numbers, with the lowest and the highest of each."""
+    """Merge texts that differ only in their numbers, giving the lowest and the highest value of each number."""
     numbers = zip(*(_NUMBER.findall(text) for text in texts), strict=True)
     words = _NUMBER.split(texts[0])
     spans = [sorted(set(slot), key=float) for slot in numbers]

@@ -1,6 +1,6 @@
-"""Values of `[known]` that no robot has: another unit, a turned sign, two supplies exchanged, a name misspelt.
+"""Implausible values in `[known]`: a wrong unit, a reversed sign, exchanged supplies, a misspelt name.
 
-What is plausible, and what can be computed at all, stands in the model's own table (bifa.robot.parameters).
+The ranges of plausible and of computable values are in the model's own table (bifa.robot.parameters).
 """
 
 from collections.abc import Iterator, Mapping
@@ -11,7 +11,7 @@ from bifa.data.layout import TABLE_FILE
 from bifa.printable import printable
 from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter
 
-# How much of the parameter's unit is one of another. Only what lands within the plausible range is suggested.
+# Size of other units in terms of the parameter's unit. A unit is suggested only if it makes the value plausible.
 _UNITS = {
     "kg": {"g": 1e-3},
     "m": {"mm": 1e-3, "cm": 1e-2},
@@ -25,14 +25,14 @@ _SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
 
 
 def check_known(known: Mapping[str, float]) -> Iterator[Finding]:
-    """One finding for each value that cannot be right. A value beyond the plausible range that is not a recognisable
-    slip is taken as the lab's own, from another robot; only what the model cannot compute with is reported too."""
+    """Yield a finding for each value that cannot be right. An implausible value without a recognisable mistake is
+    assumed to belong to another robot, and reported only if the model cannot compute with it."""
     positive, negative = (known.get(name) for name in _SUPPLIES)
     exchanged = positive is not None and negative is not None and positive < 0.0 < negative
     if exchanged:
         text = (
             f"supply_positive_psi = {positive:g} psi and supply_negative_psi = {negative:g} psi: the supplies are "
-            "exchanged; the positive one is above 0, vacuum below"
+            "exchanged; the positive one must be above 0, the vacuum below 0"
         )
         yield Finding("known", text, TABLE_FILE, column="[known]")
     for name, value in known.items():
@@ -57,7 +57,7 @@ def _cause(parameter: ModelParameter, value: float) -> str | None:
         if low <= value * size <= high:
             return f"it looks like a value in {unit}; write {value * size:.4g}"
     if parameter.unit == "psi" and low <= value - _ATMOSPHERE_PSI <= high:
-        return f"it looks like an absolute pressure, gauge pressure is expected; write {value - _ATMOSPHERE_PSI:.4g}"
+        return f"it looks like an absolute pressure, but gauge is expected; write {value - _ATMOSPHERE_PSI:.4g}"
     if parameter.lower <= value <= parameter.upper:
         return None
     if parameter.lower <= -value <= parameter.upper:

@@ -1,8 +1,8 @@
-"""How late is a trial's displacement against its pressures? What the two instruments themselves say, without a model.
+"""Lag of a trial's displacement behind its pressures, estimated from the two records alone, without a model.
 
-A pressure is (F - b v) / a (paper, section III.A): each snap-through shows in it as a bump in the shape of the speed,
-some 7 psi high and a few samples wide, on a force F that changes slowly. The shift of the displacement at which its
-derivative explains the bump best is the lag: to some 0.2 ms from trial to trial, to 1 ms as such.
+A pressure is (F - b v) / a (paper, section III.A): each snap-through appears in it as a bump in the shape of the speed,
+some 7 psi high and a few samples wide, on a force F that changes slowly. The lag is the shift of the displacement at
+which its derivative explains the bump best: precise to some 0.2 ms between trials, accurate to 1 ms.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from bifa.data import Trial
 
 Motion = Callable[..., np.ndarray]  # (time_s, derivative's order) -> mm/s, as SciPy's splines
 
-LIMIT_S = 3e-3  # between trials: a third of a sample; what a robot does in them shifts it by less than 1 ms
-LIMIT_OF_ALL_S = 9e-3  # a pressure sensor's own filter may well take 8 ms; a whole sample is 10
-REACH_S = 0.04  # lags looked for
-_HALF_S = 0.12  # of the window about a snap-through
+LIMIT_S = 3e-3  # between trials: a third of a sample; differences in the robot's motion shift it by less than 1 ms
+LIMIT_OF_ALL_S = 9e-3  # common to all trials: a pressure sensor's filter may well take 8 ms; a whole sample is 10
+REACH_S = 0.04  # largest lag that is searched, either way
+_HALF_S = 0.12  # half the window about a snap-through
 _STEP_S = 1e-3
-_SNAP = 0.4  # of the greatest speed: slower motion is no snap-through
-_EXPLAINED = 0.9  # of the bump's variance, else the window tells nothing
+_SNAP = 0.4  # of the greatest speed: slower motion is not a snap-through
+_EXPLAINED = 0.9  # share of the bump's variance that must be explained for a window to count
 _CURVATURE = 3  # columns of the slow force: a parabola over the window
 
 
 @dataclass(frozen=True)
 class Lag:
-    """`late_s`: by how much the displacement is late against the pressure, negative where it is early; `sd_s` its
-    scatter as a standard deviation; `snaps`: the snap-throughs that it rests on."""
+    """`late_s`: delay of the displacement relative to the pressure, negative if it is early; `sd_s`: its standard
+    deviation; `snaps`: the number of snap-throughs that it is estimated from."""
 
     late_s: float
     sd_s: float
@@ -37,7 +37,7 @@ class Lag:
 
 
 def displacement_lag(trial: Trial) -> Lag | None:
-    """The lag of a step response or a walk; None where nothing in the trial tells it."""
+    """Estimate the lag of a step response or a walk; None if the trial does not determine it."""
     if trial.experiment not in ("step_response", "locomotion") or len(trial.time_s) < 4:
         return None
     from scipy.interpolate import CubicSpline  # slow to import
@@ -55,21 +55,21 @@ def displacement_lag(trial: Trial) -> Lag | None:
 
 
 def misfit(lag: Lag, others: Sequence[Lag] = ()) -> str | None:
-    """What is wrong with a trial's lag compared with the session's other trials or, if there are none, with no lag
-    at all; None if it fits."""
+    """Describe how a trial's lag deviates from that of the session's other trials or, if there are none, from zero;
+    None if it fits."""
     if not others:
         return shift_of_all([lag])
     usual_s = float(np.median([other.late_s for other in others]))
     if abs(lag.late_s - usual_s) <= max(LIMIT_S, 5.0 * lag.sd_s):
         return None
     return (
-        f"the displacement is {_in_words(lag.late_s)} relative to the pressures, in the session's other "
-        f"trials {_in_words(usual_s)}: record this trial again"
+        f"the displacement is {_in_words(lag.late_s)} relative to the pressures, but "
+        f"{_in_words(usual_s)} in the session's other trials: record this trial again"
     )
 
 
 def shift_of_all(lags: Sequence[Lag]) -> str | None:
-    """What is wrong with the lag that a session's trials have in common, if anything is."""
+    """Describe what is wrong with the lag common to a session's trials; None if nothing is."""
     usual_s = float(np.median([lag.late_s for lag in lags])) if lags else 0.0
     if abs(usual_s) <= LIMIT_OF_ALL_S:
         return None
@@ -80,7 +80,7 @@ def shift_of_all(lags: Sequence[Lag]) -> str | None:
 
 
 def misfit_of(trial: Trial, earlier: Sequence[Trial]) -> str | None:
-    """What is wrong with a trial's lag compared with `earlier` ones, with its file."""
+    """Describe how a trial's lag deviates from that of `earlier` trials, with its file name; None if it fits."""
     last = displacement_lag(trial)
     if last is None:
         return None
@@ -89,13 +89,13 @@ def misfit_of(trial: Trial, earlier: Sequence[Trial]) -> str | None:
 
 
 def _in_words(late_s: float) -> str:
-    """In words, such as "8.8 ms early"."""
+    """A lag in words, such as "8.8 ms early"."""
     return f"{abs(1e3 * late_s):.1f} ms {'late' if late_s > 0.0 else 'early'}"
 
 
 def length_mm(trial: Trial) -> np.ndarray:
-    """Of the actuator in a step response, of the body in a walk, (samples,); where only the head was tracked, its
-    position: it alone moves in most of a body's snaps."""
+    """Return the length of the actuator in a step response, of the body in a walk, shape (samples,). If only the head
+    was tracked, its position is used: in most of the body's snap-throughs only the head moves."""
     columns = trial.columns
     if trial.experiment == "step_response":
         return columns["displacement_mm"]
@@ -103,7 +103,7 @@ def length_mm(trial: Trial) -> np.ndarray:
 
 
 def _snaps(time_s: np.ndarray, speed_mm_s: np.ndarray) -> list[slice]:
-    """Windows about the snap-throughs, apart from one another and from the ends of the record."""
+    """Windows about the snap-throughs, clear of one another and of the ends of the record."""
     sample_s = float(np.median(np.diff(time_s)))
     half, margin = round(_HALF_S / sample_s), round((_HALF_S + REACH_S) / sample_s) + 1
     speed = np.abs(np.convolve(speed_mm_s, np.full(3, 1 / 3), "same"))
@@ -116,7 +116,7 @@ def _snaps(time_s: np.ndarray, speed_mm_s: np.ndarray) -> list[slice]:
 
 
 def _of_snap(time_s: np.ndarray, motion: Motion, pressure_psi: np.ndarray) -> tuple[float, float] | None:
-    """Lag and standard deviation [s] by least squares over the lag; None where speed does not explain the bump."""
+    """Least-squares estimate of the lag and its standard deviation [s]; None if the speed does not explain the bump."""
     slow, _ = np.linalg.qr(np.vander(time_s - time_s.mean(), _CURVATURE))
     late_s = np.arange(-REACH_S, REACH_S + _STEP_S / 2, _STEP_S)
     bump = pressure_psi - slow @ (slow.T @ pressure_psi)

@@ -1,8 +1,8 @@
-"""Walks whose displacement runs the wrong way: a filling body gets longer, whichever way the robot goes.
+"""Walks with a reversed displacement: a filling body gets longer, whichever way the robot moves.
 
-The net displacement says nothing: a robot may slide back. Its length (or, where only the head was tracked, its
-position) must follow the body's command over whole cycles. The bump in the pressure at each snap-through decides: a
-slide or a late valve can reverse the former, not the latter.
+The net displacement proves nothing, since a robot may slide back. The body's length (or, if only the head was tracked,
+its position) must follow the body's command over whole cycles. As a slide or a late valve can reverse even that, the
+pressure's bump at each snap-through decides, which they cannot reverse.
 """
 
 from collections.abc import Iterator
@@ -15,31 +15,33 @@ from bifa.data import Trial
 from .swing import follow, swing
 
 _TAIL = "displacement_tail_mm"
-_SHORTER_MM = 5.0  # while the body is filled; healthy, tail tracked, cycles over 1.5 s: +1 to +60 mm
-_FOLLOWS = 0.6  # of its range, the body's pressure its command; less in cycles so fast that its snaps come too late
+_SHORTER_MM = 5.0  # shortening while the body is filled; healthy, tail tracked, cycles over 1.5 s: 1 to 60 mm longer
+# Share of its range by which the body's pressure follows its command; less in cycles so fast that its snap-throughs
+# come too late.
+_FOLLOWS = 0.6
 
 
 def shortens_mm(trial: Trial) -> float:
-    """By how much the body gets shorter while it is commanded to fill (tail not tracked: the head goes back); 0 if
-    negligible."""
+    """Return by how much the body gets shorter (if the tail is not tracked: the head moves back) while it is commanded
+    to fill; 0 if negligible."""
     mm = swing(trial.columns["command_body"], length_mm(trial), trial.time_s)
     return -mm if mm is not None and mm < -_SHORTER_MM else 0.0
 
 
 def check_mirror(trial: Trial) -> Iterator[Finding]:
-    """A walk whose length shrinks while the body is filled. Where nothing snaps only a length is judged."""
+    """Yield a finding for a walk whose length shrinks while the body is filled. Without any snap-through, a walk is
+    judged only if the tail was tracked too."""
     mm = shortens_mm(trial)
     if not mm or not _is_turned(trial):
         return
     if _TAIL in trial.columns:
         text = (
-            f"the body gets {mm:.1f} mm shorter (head minus tail) while it is filled, where it should get longer: "
-            "does the camera's axis point backwards, or are head and tail exchanged? Reverse both signs, or rename the "
-            "columns"
+            f"the body gets {mm:.1f} mm shorter (head minus tail) while it is filled, but should get longer: does the "
+            "camera's axis point backwards, or are head and tail exchanged? Reverse both signs, or rename the columns"
         )
     else:
         text = (
-            f"the head goes back by {mm:.1f} mm while the body is filled, where it should go forward: does the "
+            f"the head moves back by {mm:.1f} mm while the body is filled, but should move forward: does the "
             "camera's axis point backwards? Reverse the sign"
         )
     yield Finding("mirrored", text, trial.file, column="displacement_head_mm")
@@ -56,6 +58,6 @@ def _is_turned(trial: Trial) -> bool:
 
 
 def _snaps(trial: Trial) -> int:
-    """Snap-throughs whose bump in the pressure the displacement's speed explains."""
+    """Number of snap-throughs whose bump in the pressure is explained by the displacement's speed."""
     lag = displacement_lag(trial)
     return 0 if lag is None else lag.snaps

@@ -1,7 +1,8 @@
-"""Mistakes made in the lab that the format cannot refuse: signs, mirrors, exchanged tubes, another gait, a wrong unit.
+"""Mistakes made in the lab that the format cannot detect: wrong signs, mirrored axes, exchanged tubes, a wrong gait or
+unit.
 
-A diagnosis would look for their cause in the robot. Each kind has its own file, with its limits and how far healthy
-data stay from them, even with strong effects. Nothing here changes what is fitted.
+A diagnosis would look for their cause in the robot. Each kind has its own file, which notes its limits and how far
+healthy data stay from them even with strong effects. None of these checks changes what is fitted.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,14 +24,14 @@ _CHECKS = {
 
 
 def check_trial_plausibility(trial: Trial, walks: Sequence[Trial] = ()) -> list[Finding]:
-    """Likely mistakes in one trial; `walks`: the day's other walks, one of which may have the gait that was walked."""
+    """Return likely mistakes in one trial; `walks`: the day's other walks, whose gaits it may really be."""
     if trial.experiment == "locomotion":
         return [*check_walk(trial, walks), *check_units(trial)]
     return [*_CHECKS[trial.experiment](trial), *check_units(trial)]
 
 
 def check_plausibility(dataset: Dataset) -> list[Finding]:
-    """Likely mistakes in a data set: in the declared values, in single trials, in repeats that differ."""
+    """Return likely mistakes in a data set: in the declared values, in single trials, in repeats that differ."""
     walks = dataset.of("locomotion")
     found = [finding for trial in dataset.trials for finding in check_trial_plausibility(trial, walks)]
     found += check_strokes(dataset, _files(finding for finding in found if finding.kind == "unit"))

@@ -14,21 +14,21 @@ from .finding import Finding
 from .lag import displacement_lag, misfit, shift_of_all
 
 SENSOR_SPAN_PSI = 15.0  # Honeywell ABP...015PD: +-15 psi; beyond it the output is not specified
-ADC_LIMITS_PSI = (-18.75, 18.75)  # counts 0 and 1023, where 10-90 % of the supply spans 30 psi
+ADC_LIMITS_PSI = (-18.75, 18.75)  # counts 0 and 1023, since 10-90 % of the supply span 30 psi
 REPEATS_WANTED = 3  # as in the paper's section IV
-MOTION_MM = 1.0  # less than this is no experiment of this robot (strokes of 30 and 54 mm)
-FLAT_SAMPLES = 8  # equal extremes in a row, in a channel that otherwise never repeats a value
-SPIKE_MM = 5.0  # there and back within two samples; a snap-through goes there only
+MOTION_MM = 1.0  # every experiment moves by more than this (strokes of 30 and 54 mm)
+FLAT_SAMPLES = 8  # repetitions of an extreme value, in a channel that otherwise never repeats a value
+SPIKE_MM = 5.0  # there and back within two samples; a snap-through does not come back
 
 
 def check_recordings(dataset: Dataset) -> list[Finding]:
-    """Every defect, those of single trials first, in the order of the data set."""
+    """Return all defects: those of single trials in the order of the data set, then those of the whole."""
     findings = [found for trial in dataset.trials for found in check_recording(trial)]
     return findings + [found for check in DATASET_CHECKS for found in check(dataset)]
 
 
 def check_recording(trial: Trial) -> list[Finding]:
-    """Defects of one trial by itself."""
+    """Return the defects of a single trial."""
     return [found for check in TRIAL_CHECKS for found in check(trial)]
 
 
@@ -57,7 +57,7 @@ def _saturated_pressure(trial: Trial) -> Iterator[Finding]:
 
 
 def _clipped_instrument(trial: Trial) -> Iterator[Finding]:
-    """A flat top in displacement or force: the same extreme value again and again, where noise repeats nothing."""
+    """Flat tops in displacement or force: an extreme value repeats in a channel whose noise never repeats a value."""
     for name, values in _columns(trial, "displacement", "force"):
         same = np.diff(values) == 0
         for extreme in (values.max(), values.min()):
@@ -95,7 +95,7 @@ def _no_value(trial: Trial) -> Iterator[Finding]:
 
 def _held_marker(trial: Trial) -> Iterator[Finding]:
     if trial.experiment not in ("step_response", "locomotion"):
-        return  # a cross-head may well rest
+        return  # a cross-head may rest
     for name, values in _columns(trial, "displacement"):
         rows = np.flatnonzero(held(values))
         if rows.size:
@@ -108,11 +108,11 @@ def _clock(trial: Trial) -> Iterator[Finding]:
     nominal = 1.0 / trial.nominal_rate_hz
     median = float(np.median(step))
     if abs(median / nominal - 1) > 0.05:
-        text = f"sampled at {1 / median:.1f} Hz where the format says {trial.nominal_rate_hz:g} Hz"
+        text = f"sampled at {1 / median:.1f} Hz, but the format specifies {trial.nominal_rate_hz:g} Hz"
         yield Finding("rate", text, trial.file, column="time_s")
     camera_hz = trial.extra.get("camera_rate_hz")
     if isinstance(camera_hz, int | float) and camera_hz < 0.95 * trial.nominal_rate_hz:
-        text = f"the camera recorded {camera_hz:g} samples a second where the format says {trial.nominal_rate_hz:g} Hz"
+        text = f"the camera recorded at {camera_hz:g} Hz, but the format specifies {trial.nominal_rate_hz:g} Hz"
         yield Finding("rate", text, trial.file, column="time_s")
     rows = np.flatnonzero(step > 1.5 * median)
     if rows.size:
@@ -141,7 +141,7 @@ def _no_command(trial: Trial) -> Iterator[Finding]:
 def _start(trial: Trial) -> Iterator[Finding]:
     """Trials begin contracted (displacement 0); a step response begins under vacuum."""
     for name, values in _columns(trial, "displacement"):
-        # Under vacuum an actuator is drawn in beyond its contracted state: small ones by a sixth of what they move.
+        # Vacuum draws an actuator in beyond its contracted state: small ones by a sixth of their range of motion.
         share = 0.25 if trial.experiment == "step_response" else 0.1
         if abs(values[0]) > 2.0 + share * np.ptp(values):
             text = f"begins at {values[0]:.2f} mm: displacement is 0 at the contracted state"
@@ -156,7 +156,7 @@ def _commanded_pressure(trial: Trial) -> Iterator[Finding]:
     measured = float(np.mean(trial.columns["pressure_psi"]))
     if abs(measured - trial.pressure_psi) > max(1.0, 0.15 * abs(trial.pressure_psi)):
         sign = ": its sign is reversed" if measured * trial.pressure_psi < 0.0 else ""
-        text = f"{measured:.2f} psi on average where {trial.pressure_psi:g} psi was commanded{sign}"
+        text = f"{measured:.2f} psi on average, but {trial.pressure_psi:g} psi was commanded{sign}"
         yield Finding("pressure", text, trial.file, column="pressure_psi")
 
 
@@ -185,14 +185,14 @@ def _missing_experiments(dataset: Dataset) -> Iterator[Finding]:
 
 
 def _lags(dataset: Dataset) -> Iterator[Finding]:
-    """Instruments whose clocks were lined up wrongly in single trials, or in all of them."""
+    """Instruments whose clocks were aligned wrongly in single trials, or in all of them."""
     lags = {trial.file: lag for trial in dataset.trials if (lag := displacement_lag(trial)) is not None}
     for file, lag in lags.items():
         others = [other for name, other in lags.items() if name != file]
         if others and (text := misfit(lag, others)):
             yield Finding("lag", text, file)
     if text := shift_of_all(list(lags.values())):
-        yield Finding("lag", f"in the {len(lags)} trials that show it (median) {text}")
+        yield Finding("lag", f"median of the {len(lags)} trials that show it: {text}")
 
 
 def _session_order(dataset: Dataset) -> Iterator[Finding]:

@@ -1,9 +1,10 @@
-"""A repeat unlike the others of its condition: what differs that much was not repeated.
+"""Repeats that differ so much from the others of their condition that something else must have been recorded.
 
-What is compared does not depend on when a recording was started: forces at equal displacement, steps and walks from
-the first switch on. Of a walk only the pressures and the length count: two runs of a brittle gait may end far apart.
+The comparison does not depend on when a recording was started: forces are compared at equal displacement, steps and
+walks from the first switch on. For walks only pressures and length count, since two runs of a brittle gait may end far
+apart.
 
-And the same record in two trials, as a file was saved, named or copied twice: no two recordings have the same noise.
+Also finds the same record in two trials, saved, named or copied twice: no two recordings have the same noise.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -15,20 +16,20 @@ from bifa.check.finding import Finding
 from bifa.data import Dataset, Trial
 from bifa.data.layout import is_command
 
-# Of a channel's range, as an RMS difference. Healthy: 0.08 at most, where areas drift or sensors warm.
+# Limits of the RMS difference, as a share of a channel's range. Healthy: 0.08 at most, if areas drift or sensors warm.
 _UNLIKE = 0.10
-_UNLIKE_OF_TWO = 0.20  # where nothing tells which of the two it is
-_OF_OTHERS = 4.0  # times as far as the others are from one another
-_OF_DAY = 5.0  # times the day's usual difference between repeats of this experiment: a lab's ordinary scatter
+_UNLIKE_OF_TWO = 0.20  # for two repeats, which do not show which of them is wrong
+_OF_OTHERS = 4.0  # in units of the others' difference from one another
+_OF_DAY = 5.0  # in units of the day's usual difference between repeats of this experiment: a lab's ordinary scatter
 _POINTS = 400
 _LENGTH = "displacement_head_mm - displacement_tail_mm"
 
-Curve = tuple[np.ndarray, np.ndarray]  # at what, rising; and the values
+Curve = tuple[np.ndarray, np.ndarray]  # increasing abscissae, and the values there
 
 
 @dataclass(frozen=True)
 class _Group:
-    """Repeats of a condition: `apart[channel]`, shape (n, n), how far they are from one another, and the ranges."""
+    """Repeats of a condition: `apart[channel]`, shape (n, n), their RMS differences as shares of `ranges[channel]`."""
 
     trials: Sequence[Trial]
     apart: dict[str, np.ndarray]
@@ -36,7 +37,7 @@ class _Group:
 
 
 def check_repeats(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
-    """`skipped`: files in which a mistake is known already; they are compared with nothing."""
+    """Yield a finding for each repeat unlike the others. `skipped`: files with a known mistake, left out."""
     kept = [[trial for trial in group if trial.file not in skipped] for group in dataset.repeats()]
     groups = [_compared(group) for group in kept if len(group) > 1]
     for group in groups:
@@ -45,7 +46,8 @@ def check_repeats(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[F
 
 
 def check_copies(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
-    """Trials whose displacement or force is that of an earlier one of the experiment; `skipped`: files told of."""
+    """Yield a finding for each trial whose displacement or force equals that of an earlier trial of the same
+    experiment. `skipped`: files with a known mistake, left out."""
     first: dict[tuple[str, str, bytes], str] = {}
     for trial in (trial for trial in dataset.trials if trial.file not in skipped):
         for name, values in trial.columns.items():
@@ -53,14 +55,14 @@ def check_copies(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Fi
                 continue
             earlier = first.setdefault((trial.experiment, name, values.tobytes()), trial.file)
             if earlier != trial.file:
-                text = f"has the same {name} as {earlier}, sample by sample: give its own record, or leave it out"
+                text = f"has the same {name} as {earlier}, sample by sample: insert its own record, or leave it out"
                 yield Finding("copy", text, trial.file, column=name)
                 break
 
 
 def _of_more(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
-    """A repeat counts as different only if even the nearest other one is far away: two of five that agree are no
-    mistake."""
+    """Findings in groups of three and more. A repeat counts as different only if even the nearest other one is far
+    away: if two of five agree with each other, neither is a mistake."""
     for place, trial in enumerate(group.trials):
         others = [k for k in range(len(group.trials)) if k != place]
         found = []
@@ -74,8 +76,8 @@ def _of_more(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
             span, unit = group.ranges[channel], _unit(channel)
             text = (
                 f"repeat {trial.repeat} of {trial.label} differs from the others by {far * span:.3g} {unit} (RMS), "
-                f"they from one another by {alike * span:.2g} {unit}: was something else mounted or set? Record it "
-                "again, or leave it out"
+                f"which differ by {alike * span:.2g} {unit} from one another: was something else mounted or set? "
+                "Record it again, or leave it out"
             )
             yield Finding("repeat", text, trial.file, column=channel)
 
@@ -94,7 +96,7 @@ def _of_two(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
 
 
 def _usual(group: _Group, groups: Sequence[_Group]) -> dict[str, float]:
-    """The median difference between repeats in the experiment's other conditions, by channel; 0 without any."""
+    """Median difference between repeats in the experiment's other conditions, by channel; 0 if there are none."""
     found: dict[str, list[float]] = {channel: [] for channel in group.apart}
     for other in groups:
         if other is not group and other.trials[0].experiment == group.trials[0].experiment:
@@ -118,7 +120,7 @@ def _compared(trials: Sequence[Trial]) -> _Group:
 
 
 def _apart(one: Sequence[Curve], other: Sequence[Curve]) -> float:
-    """RMS difference where both were recorded."""
+    """RMS difference over the range where both were recorded."""
     squares, spans = [], []
     for (at_one, values_one), (at_other, values_other) in zip(one, other, strict=True):
         low, high = max(at_one[0], at_other[0]), min(at_one[-1], at_other[-1])
@@ -130,7 +132,7 @@ def _apart(one: Sequence[Curve], other: Sequence[Curve]) -> float:
 
 
 def _curves(trial: Trial) -> dict[str, list[Curve]]:
-    """What of a trial is compared, by channel; a loading in its two branches."""
+    """The curves of a trial that are compared, by channel; a loading as its two branches."""
     columns = trial.columns
     if trial.experiment in ("static_loading", "anchor_pull"):
         mm, force_N = columns["displacement_mm"], columns["force_N"]

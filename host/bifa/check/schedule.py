@@ -1,4 +1,4 @@
-"""Does a walk's gait say what its recorded commands did? Both are written down, and either may be of another walk."""
+"""Compare a walk's declared gait with its recorded commands: either may belong to another walk."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TypeVar
@@ -10,10 +10,10 @@ from bifa.data import Trial
 from bifa.ranges import RANGES
 from bifa.robot.cpg import CHAMBERS, COUPLING_PER_S
 
-# A record at 100 Hz tells a phase to 0.2 % of a cycle of 4 s; the Uno's resonator is good to 0.5 %.
+# A record at 100 Hz resolves a phase to 0.2 % of a cycle of 4 s; the Uno's resonator is good to 0.5 %.
 _PERIOD_SHARE = 0.02
-_CYCLE_SHARE = 0.05  # of duties and phases
-_SETTLED = 5.0  # time constants of the coupling, after which phases are what the gait says
+_CYCLE_SHARE = 0.05  # for duties and phases
+_SETTLED = 5.0  # time constants of the coupling, after which the phases are those of the gait
 
 Turns = TypeVar("Turns", float, np.ndarray)
 
@@ -22,18 +22,18 @@ _DUTIES = {chamber: f"duty_{chamber}" for chamber in CHAMBERS}
 
 
 def check_gait(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
-    """A gait that the commands contradict; `walks`, others of the day, may have the gait that they fit."""
+    """Yield a finding if the commands contradict the gait. `walks`: the day's others, whose gait they may match."""
     seen = seen_gait(trial, trial.columns)
     wrong = contradicted(trial.walked, seen)
     if wrong:
         values = ", ".join(f"{name} = {_written(name, seen[name])}" for name in wrong)
         given = ", ".join(f"{trial.walked[name]:g}" for name in wrong)
-        text = f"the recorded commands have {values}, the gait in dataset.toml {given}"
+        text = f"the recorded commands have {values}, but the gait in dataset.toml has {given}"
         yield Finding("gait", f"{text}: {_why(trial, seen, wrong, walks)}", trial.file)
 
 
 def seen_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """The parameters of a gait that the columns `command_body` ... show, by name, phases in 0 to 360 degrees."""
+    """Estimate gait parameters from the columns `command_body` ..., by name; phases are in 0 to 360 degrees."""
     time_s = trial.time_s * trial.extra.get("clock_rate", 1.0)  # by the Uno's clock, as the gait is
     falls, rises = {}, {}
     for chamber in CHAMBERS:
@@ -56,7 +56,7 @@ def seen_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, flo
 
 
 def contradicted(gait: Mapping[str, float], seen: Mapping[str, float]) -> list[str]:
-    """The parameters of `gait` that differ from those `seen`, in the gait's order."""
+    """Return the names of parameters of `gait` that differ from those `seen`, in the gait's order."""
     return [name for name in gait if name in seen and not _same(name, gait[name], seen[name])]
 
 
@@ -71,7 +71,7 @@ def _same(name: str, given: float, seen: float) -> bool:
 def _why(trial: Trial, seen: Mapping[str, float], wrong: Sequence[str], walks: Sequence[Trial]) -> str:
     given = trial.walked
     if all(name in _PHASES.values() and _same(name, 360.0 - given[name], seen[name]) for name in wrong):
-        return "a phase is how far head and tail are ahead of the body, not behind it; correct dataset.toml"
+        return "a phase says how far head and tail are ahead of the body, not behind it; correct dataset.toml"
     if all(name in _DUTIES.values() and _same(name, 1.0 - given[name], seen[name]) for name in wrong):
         return "a duty is the part of the cycle at vacuum, not under pressure; correct dataset.toml"
     for other in walks:
@@ -86,21 +86,21 @@ def _written(name: str, value: float) -> str:
 
 
 def _settled_s(gait: Mapping[str, float]) -> float:
-    """When the phases have settled: three oscillators pull one another straight at three times the coupling's rate."""
+    """Time until the phases have settled: three coupled oscillators synchronize at three times the coupling's rate."""
     coupling_per_s = gait.get("coupling_per_s", COUPLING_PER_S)
     return _SETTLED / (3.0 * coupling_per_s) if coupling_per_s > 0.0 else np.inf
 
 
 def _vacuum_s(falls_s: np.ndarray, rises_s: np.ndarray) -> np.ndarray:
-    """How long each vacuum lasted that the record shows whole."""
+    """Durations of the vacuum phases that the record shows completely."""
     after = np.searchsorted(rises_s, falls_s)
     whole = after < len(rises_s)
     return rises_s[after[whole]] - falls_s[whole]
 
 
 def _ahead(falls_s: np.ndarray, body_s: np.ndarray, period_s: float) -> np.ndarray:
-    """How many turns each fall, where a phase begins, is ahead of the body's next one; wrapped to be near one
-    another."""
+    """Turns by which each fall (the beginning of a phase) is ahead of the body's next one, wrapped to lie near the
+    first."""
     if not len(falls_s) or not len(body_s):
         return np.zeros(0)
     next_one = np.minimum(np.searchsorted(body_s, falls_s), len(body_s) - 1)
@@ -109,7 +109,7 @@ def _ahead(falls_s: np.ndarray, body_s: np.ndarray, period_s: float) -> np.ndarr
 
 
 def _agreed(values: np.ndarray, tolerance: float) -> float | None:
-    """The median, where two of the values at least agree with it: a start or an end may have made the others."""
+    """Median of the values if at least two agree with it, since a start or an end may distort the others; else None."""
     if len(values) < 2:
         return None
     middle = float(np.median(values))
@@ -117,5 +117,5 @@ def _agreed(values: np.ndarray, tolerance: float) -> float | None:
 
 
 def _wrapped(turns: Turns) -> Turns:
-    """Turns in -0.5 to 0.5."""
+    """Wrap turns to -0.5 to 0.5."""
     return (turns + 0.5) % 1.0 - 0.5

@@ -9,22 +9,24 @@ from bifa.data import Trial
 
 from .swing import follow, swing
 
-_TRAVEL_MM = 5.0  # less of it shows no stable end
-_ENDS = ((0.0, 0.05), (0.15, 0.25), (0.75, 0.85), (0.95, 1.0))  # of the travel
-_FALLS = -0.05  # of the force's range, at both ends; healthy: +0.15 or more at the one, +0.28 at the other
-_OTHER_WAY = 2.0  # how much further to the wrong side than to the right one; healthy: less than 0.1
-# Of the range, the other way round. Healthy: 0.92 and more of a pressure, 0.53 and more of a displacement.
+_TRAVEL_MM = 5.0  # smallest travel that reaches the stable ends
+_ENDS = ((0.0, 0.05), (0.15, 0.25), (0.75, 0.85), (0.95, 1.0))  # as shares of the travel
+_FALLS = -0.05  # share of the force's range, at both ends; healthy: +0.15 or more at one end, +0.28 at the other
+_OTHER_WAY = 2.0  # ratio of the extremes on the wrong and on the right side; healthy: less than 0.1
+# Share of its range by which a reversed quantity follows the command. Healthy: 0.92 and more for a pressure, 0.53 and
+# more for a displacement.
 AGAINST = -0.5
-PORTS = "where it should rise: are the sensor's two ports exchanged? Reverse the sign"
-_MOVES_MM = 5.0  # the other way; small actuators have a stroke of 30 mm
+PORTS = "but should rise: are the sensor's two ports exchanged? Reverse the sign"
+_MOVES_MM = 5.0  # smallest reversed motion that counts; small actuators have a stroke of 30 mm
 
 
 def check_static_loading(trial: Trial) -> Iterator[Finding]:
-    """At either stable end an actuator resists both ways, whatever the pressure: K rises there, and so the force."""
+    """Check the signs of a static loading. At either stable end an actuator resists motion both ways, whatever the
+    pressure: K rises there, and so does the force."""
     mm, force_N = trial.columns["displacement_mm"], trial.columns["force_N"]
     if -mm.min() > max(_TRAVEL_MM, _OTHER_WAY * mm.max()):
         text = (
-            f"goes down to {mm.min():.1f} mm where it should go up: displacement is positive when extending; "
+            f"goes down to {mm.min():.1f} mm, but should go up: displacement is positive when extending; "
             "reverse its sign"
         )
         yield Finding("sign", text, trial.file, column="displacement_mm")
@@ -36,7 +38,7 @@ def check_static_loading(trial: Trial) -> Iterator[Finding]:
     limit = _FALLS * np.ptp(force_N)
     if first < limit and last < limit:
         text = (
-            f"falls by {-first:.2f} N over the first fifth of the travel and by {-last:.2f} N over the last, where "
+            f"falls by {-first:.2f} N over the first fifth of the travel and by {-last:.2f} N over the last, but "
             "pulling an actuator out of a stable state takes a rising force: is pushing counted as positive? "
             "Positive is pulling; reverse the sign"
         )
@@ -44,18 +46,19 @@ def check_static_loading(trial: Trial) -> Iterator[Finding]:
 
 
 def check_anchor_pull(trial: Trial) -> Iterator[Finding]:
-    """An anchor resists: its force is positive, whichever way the head is pulled."""
+    """Check the sign of an anchor pull: an anchor resists, so its force is positive, whichever way the head is
+    pulled."""
     force_N = trial.columns["force_N"]
     if np.median(force_N) < 0.0 and -force_N.min() > _OTHER_WAY * force_N.max():
         text = (
-            f"{np.median(force_N):.2f} N in the middle (median), where a resistance is positive: does the load cell "
+            f"the median is {np.median(force_N):.2f} N, but a resistance is positive: does the load cell "
             "count the other way? Reverse the sign"
         )
         yield Finding("sign", text, trial.file, column="force_N")
 
 
 def check_step_response(trial: Trial) -> Iterator[Finding]:
-    """A chamber fills and its actuator extends while the command is 1."""
+    """Check the signs of a step response: while the command is 1, a chamber fills and its actuator extends."""
     command, time_s = trial.columns["command"], trial.time_s
     share = follow(command, trial.columns["pressure_psi"], time_s)
     moved_mm = swing(command, trial.columns["displacement_mm"], time_s)
@@ -64,7 +67,7 @@ def check_step_response(trial: Trial) -> Iterator[Finding]:
     falls, shrinks = share < AGAINST, moved_mm < -_MOVES_MM
     if falls and shrinks:
         text = (
-            f"while it is 1 the pressure falls and the displacement shrinks by {-moved_mm:.1f} mm: 1 is positive "
+            f"while it is 1, the pressure falls and the displacement shrinks by {-moved_mm:.1f} mm: 1 is positive "
             "pressure, 0 vacuum; exchange them"
         )
         yield Finding("sign", text, trial.file, column="command")

@@ -1,17 +1,19 @@
-"""How far a quantity follows a valve's command: this reveals signs, mirrors and swaps without a model of the robot.
+"""How far a quantity follows a valve's command: reveals reversed signs, mirrored axes and swapped channels without a
+model of the robot.
 
 A chamber fills while its command is 1 and empties while it is 0, so its pressure goes all the way up and down over the
-spans of its own command, less far over another chamber's, and the other way if its sign is reversed.
+spans of its own command, less far over those of another chamber, and the opposite way if its sign is reversed.
 """
 
 import numpy as np
 
 
 def swing(command: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> float | None:
-    """By how much `values` rise while the command is 1 and fall while it is 0: the mean over spans between switches.
+    """Return by how much `values` rise while the command is 1 and fall while it is 0: the mean over spans between
+    switches.
 
-    All of shape (samples,). Whole cycles count, freed from their steady drift (a robot that slides down a slope). None
-    where the command never switches.
+    All arguments have shape (samples,). Only whole cycles count (if there is one), and steady drift over them is
+    removed (a robot that slides down a slope). None if the command never switches.
     """
     at = np.flatnonzero(np.diff(command))
     if not at.size:
@@ -28,6 +30,6 @@ def swing(command: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> float 
 
 
 def follow(command: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> float | None:
-    """`swing` as a share of the values' range, -1 to 1; None where command or values never change."""
+    """Return `swing` as a share of the values' range, -1 to 1; None if the command or the values never change."""
     span, gone = float(np.ptp(values)), swing(command, values, time_s)
     return None if gone is None or span == 0.0 else gone / span

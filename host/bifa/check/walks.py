@@ -1,6 +1,6 @@
-"""What was mistaken in a walk: exchanged chambers first, since everything else would seem wrong with them.
+"""Mistakes in walks. Exchanged chambers come first, since they would make everything else seem wrong.
 
-Which command does each chamber's pressure follow? Its own, unless chambers are exchanged or a sign is reversed.
+Each chamber's pressure follows its own command, unless chambers are exchanged or a sign is reversed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,23 +17,23 @@ from .schedule import check_gait, contradicted, seen_gait
 from .signs import AGAINST, PORTS
 from .swing import follow, swing
 
-# Of a pressure's range. In cycles of 3 s and more it follows its own command over 0.62 to 0.98 of it, even where valves
-# choke; in faster ones over less, which tells nothing.
+# Share of a pressure's range. In cycles of 3 s and more it follows its own command over 0.62 to 0.98 of it, even if
+# valves choke; in faster ones over less, which proves nothing.
 _FOLLOWS = 0.5
-# Better with another's command than with its own. Healthy: whichever are exchanged, one of them worse by 0.24 or more.
+# Gain over following its own command. In healthy walks every exchange makes one of the chambers worse by 0.24 or more.
 _BETTER = 0.04
 
-Exchange = dict[str, str]  # chamber: whose command its pressure follows
+Exchange = dict[str, str]  # chamber -> chamber whose command its pressure follows
 
 
 def check_walk(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
-    """`walks`: the day's others, whose gait this may be."""
+    """Yield the mistakes in a walk. `walks`: the day's other walks, whose gait this may be."""
     shares = _following(trial)
     all_against = bool((np.diag(shares) < AGAINST).all())
     if all_against and shortens_mm(trial):
         text = (
-            "while they are 1 the pressures fall and the body gets shorter: 1 is positive pressure, 0 vacuum; exchange "
-            "them in all three columns"
+            "while they are 1, the pressures fall and the body gets shorter: 1 is positive pressure, 0 vacuum; "
+            "exchange them in all three columns"
         )
         yield Finding("sign", text, trial.file, column="command_body")
     elif not all_against and (exchange := _exchanged(shares)):
@@ -45,8 +45,8 @@ def check_walk(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
 
 
 def _following(trial: Trial) -> np.ndarray:
-    """(3, 3) shares of the range by which the pressure of a chamber (row) follows the command of each (column), in the
-    order of CHAMBERS; NaN where one of them never changes."""
+    """Shares of its range by which the pressure of each chamber (row) follows the command of each (column), shape
+    (3, 3) in the order of CHAMBERS; NaN where one of the two never changes."""
     shares = np.full((3, 3), np.nan)
     for i, pressure in enumerate(CHAMBERS):
         for j, command in enumerate(CHAMBERS):
@@ -68,24 +68,25 @@ def _exchanged(shares: np.ndarray) -> Exchange:
 
 
 def _exchange_finding(trial: Trial, exchange: Exchange, shares: np.ndarray) -> Finding:
-    """What was exchanged, in words: the commands' columns, if the gait says so, else something about the pressures."""
+    """Finding that describes what was exchanged: the commands' columns if the gait implies it, otherwise something
+    about the pressures."""
     chamber, followed = next(iter(exchange.items()))
     row = shares[CHAMBERS.index(chamber)]
     seen = (
-        f"follows command_{followed} (up and down with it over {_percent(row, followed)} % of its range, with "
-        f"command_{chamber} {_percent(row, chamber)} %)"
+        f"follows command_{followed} (over {_percent(row, followed)} % of its range, and "
+        f"command_{chamber} over {_percent(row, chamber)} %)"
     )
     names = " and ".join(exchange)
     renamed = {f"command_{c}": trial.columns[f"command_{exchange.get(c, c)}"] for c in CHAMBERS}
     if _fits(trial, trial.columns) or not _fits(trial, renamed):
-        what = f"the pressures' columns, sensors or tubes of {names} are exchanged: trace the tubes, rename the columns"
+        what = f"pressure columns, sensors or tubes of {names} are exchanged: trace the tubes, or rename the columns"
     else:
-        what = f"the command columns of {names} are exchanged, as the gait says too: rename them"
+        what = f"the command columns of {names} are exchanged, as the gait confirms: rename them"
     return Finding("swapped", f"{seen}: {what}", trial.file, column=f"pressure_{chamber}_psi")
 
 
 def _turned(trial: Trial, shares: np.ndarray) -> Iterator[Finding]:
-    """Pressures that fall while their own command is positive."""
+    """A finding for pressures that fall while their own command is positive."""
     chambers = [CHAMBERS[i] for i in np.flatnonzero(np.diag(shares) < AGAINST)]
     if chambers:
         names = [f"pressure_{chamber}_psi" for chamber in chambers]

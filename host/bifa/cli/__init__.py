@@ -22,7 +22,7 @@ from bifa.printable import printable
 
 
 class _Commands(typer.core.TyperGroup):
-    """Ctrl-C ends each command with a line that says what was kept, a full disk with one that says so."""
+    """End every command on Ctrl-C with a line on what was kept, and on a full disk with an error that says so."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -33,7 +33,7 @@ class _Commands(typer.core.TyperGroup):
             raise typer.Exit(130) from None
 
 
-_PANELS = 80  # columns: narrower, the panels' columns would cut names off
+_PANELS = 80  # terminal columns; on narrower terminals rich's panels would truncate names
 
 app = typer.Typer(
     name="bifa",
@@ -54,7 +54,7 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def _commands(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Drive a soft in-pipe robot from an Arduino Uno and learn from data how it really behaves."""
@@ -63,18 +63,20 @@ def _commands(
 for _module in sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name[0] != "_"):
     _file = importlib.import_module(f"{__name__}.{_module}")
     app.command(epilog="\n\n".join(("Examples:", *_file.EXAMPLES)))(getattr(_file, _module))
-for _command in app.registered_commands:  # a paragraph fills the terminal, however the docstring is broken
+for _command in app.registered_commands:  # paragraphs fill the terminal, wherever the docstring breaks its lines
     _command.help = re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.getdoc(_command.callback) or "")
-    _command.short_help = re.split(r"(?<=\.)\s", _command.help)[0]  # its first sentence, not 45 characters of it
+    _command.short_help = re.split(r"(?<=\.)\s", _command.help)[
+        0
+    ]  # the whole sentence; typer truncates at 45 characters
 
 
 def main() -> None:
-    """Run the command; an expected error ends in one clear sentence and exit status 2."""
+    """Run the command; an expected error prints its message and exits with status 2."""
     _print_anything()
     try:
         app()
     except Exception as error:
-        # A rig that another package offers cannot know BifaError; it marks its errors.
+        # Rigs from other packages cannot import BifaError; they mark their errors instead.
         if not isinstance(error, BifaError) and not getattr(error, "for_the_user", False):
             raise
         typer.echo(f"error: {printable(str(error))}", err=True)
@@ -82,7 +84,7 @@ def main() -> None:
 
 
 def _print_anything() -> None:
-    """What is redirected on Windows is encoded in an old code page: a Greek letter must not end a command there."""
+    """Replace what cannot be encoded: on Windows, redirected output uses a legacy code page without Greek letters."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # not None, as without a console, nor what a program put there
+        if isinstance(stream, io.TextIOWrapper):  # without a console it is None; an embedding program may replace it
             stream.reconfigure(errors="replace")

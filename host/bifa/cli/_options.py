@@ -1,4 +1,4 @@
-"""Options shared by several commands, each under one name and with completion; and how commands end."""
+"""Options shared by several commands, with their completion, and the handling of Ctrl-C."""
 
 import pkgutil
 from collections.abc import Callable, Iterator
@@ -11,15 +11,15 @@ import typer
 from bifa.printable import counted
 
 Profile = Literal["ideal", "realistic", "worn"]
-Method = Literal["cma", "de", "bo"]  # bifa.gait.methods.METHODS, which would be seconds to import
+Method = Literal["cma", "de", "bo"]  # bifa.gait.methods.METHODS, which takes seconds to import
 Obstacle = Literal["tunnel", "subtunnels", "arcs"]  # bifa.simulate.obstacles
 
 
-# What is completed; typer itself keeps of it what begins as the word does.
+# Completions: typer keeps those that begin with what was typed.
 
 
 def ports() -> list[str]:
-    """Rigs by name and serial ports."""
+    """Names of rigs, and serial ports."""
     from importlib.metadata import entry_points
 
     from bifa.rig.ports import serial_ports
@@ -28,35 +28,35 @@ def ports() -> list[str]:
 
 
 def effects() -> list[str]:
-    """Effects of the library, one a file."""
+    """Names of the library's effects."""
     import bifa.effects
 
     return sorted(module.name for module in pkgutil.iter_modules(bifa.effects.__path__) if module.name != "effect")
 
 
 def known_names() -> list[str]:
-    """Parameters that can be declared, as NAME=."""
+    """Parameters whose values can be declared, as `NAME=`."""
     from bifa.robot.parameters import BASE_PARAMETERS
 
     return [f"{name}=" for name in BASE_PARAMETERS]
 
 
 def gait_names() -> list[str]:
-    """Gaits of the library."""
+    """Names of the library's gaits."""
     from bifa.gait.library import NAMES
 
     return list(NAMES)
 
 
 def stages() -> list[str]:
-    """Stages of a campaign."""
+    """Names of a campaign's stages."""
     from bifa.campaign.loop import campaign
     from bifa.campaign.setup import Effort, Setup
 
     return [stage.name for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)]
 
 
-def port_option(text: str = "Serial port, `virtual`, or the name of a rig; detected if left out.") -> Any:
+def port_option(text: str = "Serial port, `virtual`, or the name of a rig (default: detected).") -> Any:
     """The option --port."""
     return typer.Option(help=text, metavar="PORT", autocompletion=ports)
 
@@ -69,28 +69,28 @@ def file_option(text: str) -> Any:
 DATASET = typer.Argument(help="The data set's folder.", show_default=False, exists=True, file_okay=False)
 PORT = port_option()
 KNOWN = typer.Option(
-    help="A value that you measured, such as head_mass_kg=0.182; repeatable.",
+    help="Value of a parameter that you measured, such as head_mass_kg=0.182; repeatable.",
     metavar="NAME=VALUE",
     autocompletion=known_names,
 )
 RERUN = typer.Option(help="Run this stage again even if it is up to date.", metavar="STAGE", autocompletion=stages)
-WATCH = typer.Option(help="Folder in which your instruments save, subfolders included (serial port).")
+WATCH = typer.Option(help="Folder, including subfolders, where your instruments save their files (serial port).")
 BENCH_FILE = Path("bench.toml")
-BENCH = file_option(f"File that declares how your instruments write theirs (bifa instrument); else {BENCH_FILE}.")
+BENCH = file_option(f"File that declares the formats of your instruments (bifa instrument; default: {BENCH_FILE}).")
 QUICK = typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
-PROFILE = typer.Option(help="Profile of a virtual robot; ideal: the paper's equations and white noise.")
+PROFILE = typer.Option(help="Profile of the virtual robot; ideal: the paper's equations with white noise.")
 PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
 
 
 def requires(needed: str, **options: object) -> None:
-    """Usage error where one of `options` is given, neither None nor False: it does nothing without what is `needed`."""
+    """Raise a usage error if any of `options` is given (not None or False): they have no effect without `needed`."""
     given = [name for name, value in options.items() if value is not None and value is not False]
     if idle := [f"--{name.replace('_', '-')}" for name in given]:
         raise typer.BadParameter(f"{' and '.join(idle)} {'require' if idle[1:] else 'requires'} {needed}")
 
 
 def kept(out: Path, what: str) -> str:
-    """What an interrupted recording has on disk, in words; `what`: one of its files."""
+    """Describe what an interrupted recording has left on disk; `what` names one of its files."""
     from bifa.data.write import partial_of
 
     partial = partial_of(out)
@@ -99,7 +99,7 @@ def kept(out: Path, what: str) -> str:
 
 @contextmanager
 def stoppable(kept: Callable[[], str]) -> Iterator[None]:
-    """On Ctrl-C, end the command with status 130 and a line with what `kept()` says was kept."""
+    """On Ctrl-C, print what was kept, as described by `kept()`, and exit with status 130."""
     try:
         yield
     except KeyboardInterrupt:

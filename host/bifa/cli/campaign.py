@@ -39,34 +39,39 @@ _PROFILE: Profile = "realistic"
 
 
 def campaign(
-    out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/campaign"),
+    out: Annotated[Path, typer.Option(help="Folder for all artefacts; name it again to resume.")] = Path(
+        "out/campaign"
+    ),
     port: Annotated[str, port_option("`virtual`, a serial port, or the name of your own rig.")] = "virtual",
     seed: Annotated[
         int,
         typer.Option(
-            min=0, help="Random seed of the searches; and of a virtual robot, its undisclosed effect and all noise."
+            min=0,
+            help="Random seed of the searches and, with a virtual robot, of its undisclosed effect and all noise.",
         ),
     ] = 0,
     quick: Annotated[bool, QUICK] = False,
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[
         Path,
-        typer.Option(help="What is known of your bench, and how your instruments write their files (serial port)."),
+        typer.Option(
+            help="File that declares what is known of your bench, and your instruments' formats (serial port)."
+        ),
     ] = BENCH_FILE,
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     profile: Annotated[Profile, PROFILE] = _PROFILE,
     rerun: Annotated[list[str], RERUN] = [],  # noqa: B006
 ) -> None:
-    """Run the whole loop on a robot; a virtual one has an undisclosed effect.
+    """Run the whole loop on a robot; a virtual robot has an undisclosed effect.
 
-    On a serial port your own camera and testing machine measure: the campaign says what to mount and start, reads the
-    files that they save (as declared: bifa instrument), aligns them with the Uno by the strobe, shows each trial, and
-    repeats it on request: docs/campaign.md.
+    On a serial port, your own camera and testing machine measure: the campaign tells you what to mount and start, reads
+    the files that they save (in the formats declared with bifa instrument), aligns them with the Uno by the strobe,
+    shows each trial, and repeats it on request. See docs/campaign.md.
 
-    Every stage can be interrupted and resumed, even days later, and is rerun only when something that it depends on
-    has changed. Only the stages that measure need the robot. What you have weighed or measured yourself is declared in
-    the bench file or with --known; everything else is fitted, or kept at its nominal value where no experiment
-    determines it. A virtual robot declares its masses and its supply pressure.
+    Every stage can be interrupted and resumed, even days later, and is rerun only if something that it depends on has
+    changed. Only the stages that measure need the robot. Declare what you have weighed or measured yourself in the
+    bench file or with --known; everything else is fitted, or kept at its nominal value if no experiment determines it.
+    A virtual robot declares its masses and its supply pressure.
     """
     from bifa.campaign.stages import check_folder
     from bifa.files import check_targets
@@ -90,12 +95,12 @@ def campaign(
     console = Console()
     options = {"sealed": seed, "profile": profile} if port == "virtual" else {}
     setup = Setup(port, seed, options, parse_known(known))
-    with stoppable(lambda: f"{kept_on_disk(out)}. The same command resumes there"):
+    with stoppable(lambda: f"{kept_on_disk(out)}. Run the same command to resume"):
         if setup.is_by_hand:
             desk, hands = at_desk(console, watch, bench)
             setup = replace(setup, known={**known_on(bench, desk), **setup.known}, hands=hands)
 
-        with console.status("starting"):  # slow to import: the person is asked first
+        with console.status("starting"):  # slow imports, so the questions come first
             from bifa.campaign import loop
             from bifa.campaign.progress import StageProgress
             from bifa.campaign.stages import run_stages
@@ -139,7 +144,7 @@ def _print_summary(console: "Console", out: Path) -> None:
 
 
 def at_desk(console: "Console", watch: Path | None, bench: Path) -> "tuple[Desk, ByHand]":
-    """The desk on this terminal, and who works the instruments there (`bifa.measure.by_hand`)."""
+    """Return the desk on this terminal, and the recorder for instruments worked by hand (`bifa.measure.by_hand`)."""
     from functools import partial
 
     from bifa.errors import BifaError
@@ -149,16 +154,16 @@ def at_desk(console: "Console", watch: Path | None, bench: Path) -> "tuple[Desk,
     from bifa.screen import Countdown
 
     if watch is not None and not watch.is_dir():
-        raise BifaError(f"the folder {watch} to watch does not exist; create it, and have the instruments save there")
+        raise BifaError(f"--watch: the folder {watch} does not exist; create it, and set the instruments to save there")
     plain = not console.encoding.lower().startswith("utf")
     desk = Desk(lambda text: console.print(text), watch, Countdown(console))
     exports = partial(read_exports, bench)
-    exports()  # what is wrong is said before anything moves
+    exports()  # reports errors in the bench file before anything moves
     return desk, ByHand(desk, watch, plain, exports, console.width)
 
 
 def kept_on_disk(out: Path) -> str:
-    """What an interrupted campaign has on disk, in words."""
+    """Describe what an interrupted campaign has left on disk."""
     import json
 
     from bifa.campaign.stages import PROVENANCE, trials_in

@@ -1,4 +1,4 @@
-"""`bifa check`: what is in a data set, pictures of it, and what looks wrong."""
+"""`bifa check`: list what is in a data set, plot it, and warn of what looks wrong."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -25,9 +25,9 @@ def check(
 ) -> None:
     """List what is in a data set, warn of what looks wrong, and plot it with --pictures.
 
-    A malformed data set gives status 2 and an error with file, line and column. Data that are well-formed but
-    doubtful (a clipped sensor, a clock that jumps, missing repeats) are listed as warnings, status 0; so are what
-    seem to be mistakes (a sign turned, tubes exchanged, a gait of another walk, a mass in grams).
+    A malformed data set ends the command with status 2 and an error that names file, line and column. Data that are
+    well-formed but doubtful (a clipped sensor, a clock that jumps, missing repeats) and likely mistakes (a reversed
+    sign, swapped tubes, the gait of another walk, a mass in grams) are listed as warnings, with status 0.
     """
     from bifa.files import check_targets, written_into
 
@@ -57,7 +57,7 @@ def check(
 
 
 def warn_of_units(console: "Console", dataset: "Dataset") -> None:
-    """Warn of units that a fit would stumble over, or a diagnosis would take for an effect."""
+    """Warn of likely mistakes in units, which would upset a fit or be mistaken for an effect."""
     from bifa.check.plausibility import check_plausibility
 
     _print_findings(console, [finding for finding in check_plausibility(dataset) if finding.kind == "unit"])

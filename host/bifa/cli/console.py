@@ -20,9 +20,9 @@ _LOOK_S = 0.2
 
 
 def console(port: Annotated[str | None, PORT] = None) -> None:
-    """Talk to the Uno: type `help`. `!` stops at once; Ctrl-D or Ctrl-C leaves, with all valves off.
+    """Type commands to the Uno; `help` lists them. `!` stops at once; Ctrl-D or Ctrl-C leaves, with all valves off.
 
-    With piped input it sends the lines one by one, prints the answers, and exits with status 1 if any was an error.
+    Piped input is sent line by line; the answers are printed, and the exit status is 1 if any was an error.
     """
     from bifa.errors import BifaError
 
@@ -46,12 +46,12 @@ def console(port: Annotated[str | None, PORT] = None) -> None:
                 converse(uno, rig)
             elif not _pipe(uno, rig):
                 raise typer.Exit(1)
-        if typed:  # or leaving would have raised
+        if typed:  # confirmed, or leaving would have raised
             typer.echo("the Uno confirms that all valves are off")
 
 
 def _lines(uno: "Uno") -> Iterator[str]:
-    """Lines from the pipe; while it is silent the Uno is told that this host is alive."""
+    """Yield the pipe's lines, and keep the link to the Uno alive while the pipe is silent."""
     import queue
     import threading
 
@@ -74,7 +74,7 @@ def _pipe(uno: "Uno", rig: "Rig") -> bool:
     from bifa.link.terminal import type_line
 
     good = True
-    uno.session.lines.clear()  # its greeting: who reads a pipe wants answers
+    uno.session.lines.clear()  # drop the greeting: a pipe's reader expects only answers
     for line in _lines(uno):
         lines = type_line(uno, line, rig.clock)
         typer.echo("\n".join(lines))

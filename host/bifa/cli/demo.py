@@ -11,7 +11,7 @@ EXAMPLES = ("bifa demo", "bifa demo --seed 3 --out out/three", "bifa demo --quic
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/demo"),
+    out: Annotated[Path, typer.Option(help="Folder for all artefacts; name it again to resume.")] = Path("out/demo"),
     seed: Annotated[
         int, typer.Option(min=0, help="Random seed of the robot, its undisclosed effect and all noise.")
     ] = 4,

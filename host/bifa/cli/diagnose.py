@@ -1,4 +1,4 @@
-"""`bifa diagnose`: what the model lacks, from a data set."""
+"""`bifa diagnose`: find out from a data set what the model lacks."""
 
 from __future__ import annotations
 
@@ -38,12 +38,13 @@ EXAMPLES = (
 def diagnose(
     dataset: Annotated[Path, DATASET],
     json: Annotated[Path | None, typer.Option(help="Write the verdict as JSON.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Write the model, completed by the effects found.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the model, completed with the effects found.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report with the evidence.")] = None,
-    model: Annotated[Path | None, file_option("Base model to start from; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Base model to start from (default: the nominal one).")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Random seed; the same seed gives the same verdict.")] = 0,
     resolve: Annotated[
-        bool, typer.Option("--resolve", help="Run the experiment that separates confusable effects, and continue.")
+        bool,
+        typer.Option("--resolve", help="Run the experiment that separates confusable effects, and diagnose again."),
     ] = False,
     port: Annotated[
         str | None, port_option("For --resolve: `virtual` (the robot that made the data), or a serial port.")
@@ -52,15 +53,15 @@ def diagnose(
     matters: Annotated[
         list[str] | None,
         typer.Option(
-            help="RMS error that is good enough, such as displacement_mm=0.5; repeatable. By default a tenth of the"
-            " noise floor.",
+            help="RMS error of a channel that is good enough, such as displacement_mm=0.5; repeatable (default: a"
+            " tenth of the noise floor).",
             show_default=False,
         ),
     ] = None,
     suspect: Annotated[
         list[str] | None,
         typer.Option(
-            help="Effect that is fitted whatever it promises, such as one that was named before; repeatable. It is"
+            help="Effect to fit whatever its screening score, such as one that was named before; repeatable. It is"
             " judged like all others.",
             show_default=False,
         ),
@@ -70,8 +71,8 @@ def diagnose(
     dask_cert: Annotated[Path | None, typer.Option(help=cluster.CERT_HELP)] = None,
     dask_key: Annotated[Path | None, typer.Option(help=cluster.KEY_HELP)] = None,
 ) -> None:
-    """Fit the base model, find the residual that repeats share, name its cause, add it to the model, and
-    report the error before and after on trials that were not fitted. Exit status 0 for any verdict."""
+    """Fit the base model, find what its residuals have in common across repeats, name the cause, and add it to the
+    model. Reports the error before and after on held-out trials. The exit status is 0 for any verdict."""
     from contextlib import nullcontext
 
     from bifa.files import check_targets, named
@@ -129,7 +130,7 @@ def diagnose(
                 rigs = _rigs(measured, port, progress)
                 try:
                     measured, found, _ = further.resolve(measured, found, diagnosed, rigs, resolved, said, hands)
-                except BaseException:  # whatever became of the rig, what the data say is told
+                except BaseException:  # whatever happened to the rig, report what the data say
                     progress.stop()
                     _report(console, measured, found, json, out, report)
                     raise
@@ -139,7 +140,7 @@ def diagnose(
 def _report(
     console: Console, measured: Dataset, found: Diagnosis, json: Path | None, model: Path | None, page: Path | None
 ) -> None:
-    """Print the diagnosis, and write what was asked for."""
+    """Print the diagnosis, and write the files that were asked for."""
     from datetime import date
     from json import dumps
     from shlex import quote
@@ -166,7 +167,7 @@ def _report(
 
 
 def _curves(found: Diagnosis, labels: dict[str, str]) -> Any:
-    """Held-out trials as measured, and as the base model and the completed one predict them."""
+    """Plot held-out trials as measured, and as predicted by the base model and the completed one."""
     from bifa.report.compared_curves import compared_curves
     from bifa.report.evidence import BASE, COMPLETED
     from lacuna.estimation.fit import evaluate_on
@@ -178,8 +179,8 @@ def _curves(found: Diagnosis, labels: dict[str, str]) -> Any:
 
 
 def _rigs(measured: Dataset, port: str | None, progress: Progress) -> Callable[[int], AbstractContextManager[Rig]]:
-    """Open the rig for a further experiment. A virtual robot is the one in the data set's provenance; where a person
-    works the instruments, no bar is redrawn over the questions."""
+    """Return a function that opens the rig for a further experiment. A virtual robot is the one in the data set's
+    provenance. While a person works the instruments, `progress` is stopped so as not to overwrite the questions."""
     from contextlib import contextmanager
 
     from bifa.campaign.resolve import SPECIMEN
@@ -202,7 +203,7 @@ def _rigs(measured: Dataset, port: str | None, progress: Progress) -> Callable[[
 
 
 def print_diagnosis(console: Console, record: dict[str, Any], labels: dict[str, str]) -> None:
-    """The record of a diagnosis in the words of its page; `labels`: what trials are called, by file."""
+    """Print the record of a diagnosis in the words of its page; `labels` names the trials by file."""
     from bifa.report.diagnosis import further, lacking, noise_table, verdict_sentence
     from bifa.report.terminal import print_lines, print_sections, print_table
 

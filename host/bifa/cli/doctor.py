@@ -1,4 +1,4 @@
-"""`bifa doctor`: what is installed, which port, which firmware, what is missing and how to get it."""
+"""`bifa doctor`: report what is installed, which port and firmware are found, and how to get what is missing."""
 
 from typing import Annotated
 
@@ -11,7 +11,7 @@ EXAMPLES = ("bifa doctor", f"bifa doctor --port {EXAMPLE_PORT}", "bifa doctor --
 
 
 def doctor(port: Annotated[str | None, port_option("Also query the board at this port (it restarts).")] = None) -> None:
-    """Say what is installed, which port and firmware there are, what is missing and how to get it.
+    """Report what is installed, which port and firmware are found, what is missing and how to get it.
 
     Exits with status 1 if something required is missing.
     """

@@ -42,7 +42,7 @@ EXAMPLES = (
 
 
 NAMES = ("static_loading", "step_response", "anchor_pull", "locomotion", "all")
-_USED_BY = {  # options that other experiments make no use of
+_USED_BY = {  # options that only some experiments use
     "actuator": ("static_loading", "step_response"),
     "rate": ("static_loading", "anchor_pull"),
     "gait": ("locomotion",),
@@ -53,13 +53,13 @@ _USED_BY = {  # options that other experiments make no use of
 
 def _named(text: str) -> str:
     if text not in NAMES:
-        raise typer.BadParameter(f"{text!r} is none of {', '.join(NAMES)}")
+        raise typer.BadParameter(f"{text!r} is not one of {', '.join(NAMES)}")
     return text
 
 
 WHICH = typer.Argument(
-    help=f"{', '.join(NAMES[:-1])}, or all: the paper's section IV, and walks.",
-    callback=_named,  # an enumeration's own help is one word that no narrow terminal can break
+    help=f"{', '.join(NAMES[:-1])}, or all (the paper's section IV, and walks).",
+    callback=_named,  # a Literal would be listed as one word, which narrow terminals cannot wrap
     autocompletion=lambda: list(NAMES),
     metavar="EXPERIMENT",
 )
@@ -70,11 +70,13 @@ def experiment(
     out: Annotated[Path, typer.Option(help="Folder of the data set: a new one, or that of an interrupted session.")],
     port: Annotated[str | None, PORT] = None,
     actuator: Annotated[
-        Literal["large", "small"] | None, typer.Option(help="Only this one (static_loading, step_response).")
+        Literal["large", "small"] | None, typer.Option(help="Only this actuator (static_loading, step_response).")
     ] = None,
-    pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
+    pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; repeatable.")] = None,
     rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed in mm/s.")] = None,
-    gait: Annotated[list[Path] | None, file_option("Gait file to walk; otherwise three built-in gaits.")] = None,
+    gait: Annotated[
+        list[Path] | None, file_option("Gait file to walk; repeatable (default: three built-in gaits).")
+    ] = None,
     cycles: Annotated[int | None, typer.Option(min=1, help="Cycles of each walk; 5, or 3 with --quick.")] = None,
     inclination: Annotated[float, typer.Option(help="Pipe inclination in degrees (positive = uphill).")] = 0.0,
     repeats: Annotated[int | None, typer.Option(min=1, help="Repeats of each condition; 3, or 2 with --quick.")] = None,
@@ -84,23 +86,23 @@ def experiment(
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[Path | None, BENCH] = None,
-    instrument: Annotated[Path | None, file_option("File of your own instrument, instead of a rig's.")] = None,
+    instrument: Annotated[Path | None, file_option("Import this file of your own instrument, without a rig.")] = None,
     telemetry: Annotated[
         Path | None, typer.Option(help="The Uno's telemetry of the same trial (bifa record).", exists=True)
     ] = None,
     add: Annotated[
         bool,
         typer.Option(
-            "--add", help="With --instrument: add it to the data set OUT as the next repeat of its condition."
+            "--add", help="With --instrument: add the trial to the data set OUT as the next repeat of its condition."
         ),
     ] = False,
 ) -> None:
     """Run a characterisation experiment and write the measurements as a data set.
 
-    Pressures go through the real firmware and link; timed commands are executed on the Uno. The instruments
+    Pressures are commanded through the real firmware and link; timed commands are executed on the Uno. The instruments
     have their own clocks, synchronised with the Uno's by its sampling strobe (D10); each trial records how well.
-    On a serial port your own instruments measure: you are told what to mount and start, trial by trial, and the
-    file that they save is the record, as it is declared in bench.toml (bifa instrument; docs/campaign.md).
+    On a serial port, your own instruments measure: you are told what to mount and start, trial by trial, and the
+    files that they save are read as declared in bench.toml (see bifa instrument and docs/campaign.md).
     Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
     from bifa.files import check_targets
@@ -131,7 +133,7 @@ def experiment(
     for psi in pressure or []:
         _check_within("--pressure", psi, *RANGES["pressure_psi"])
         if psi == 0.0 and name == "locomotion":
-            raise typer.BadParameter("--pressure 0: at 0 psi nothing walks; give a pressure above it")
+            raise typer.BadParameter("--pressure 0: at 0 psi nothing walks; give a higher pressure")
     _check_within("--inclination", inclination, *INCLINATION_RANGE_DEG, "degrees")
     if rate is not None and not math.isfinite(rate):
         raise typer.BadParameter(f"--rate must be a finite number of mm/s, not {rate:g}")
@@ -156,7 +158,7 @@ def experiment(
 
 
 def _check_within(option: str, value: float, low: float, high: float, unit: str) -> None:
-    """Not left to typer, whose ranges accept NaN."""
+    """Raise a usage error if `value` is out of range; typer's own ranges would accept NaN."""
     if not low <= value <= high:
         raise typer.BadParameter(f"{option} must be {low:g} to {high:g} {unit}, not {value:g}")
 
@@ -193,12 +195,12 @@ def _run(
     from bifa.screen import warning, words
 
     columns = (
-        words("{task.description}", table_column=Column(no_wrap=False)),  # where it is narrow, this one yields
+        words("{task.description}", table_column=Column(no_wrap=False)),  # this column wraps on narrow terminals
         BarColumn(bar_width=20),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
-    # No part of a walk's condition, but a session can only be resumed with the same number.
+    # Cycles are not part of a walk's condition, but a session can only be resumed with the same number of them.
     cycles = max(trial.cycles for trial in trials)
     errors: list[float] = []
     with open_rig(port, **options) as rig:
@@ -239,7 +241,7 @@ def _run(
 
 
 def _only(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":
-    """The one condition that the options name: which trial a record belongs to cannot be guessed."""
+    """Return the only condition that the options select; the condition of an imported record cannot be guessed."""
     first = [trial for trial in trials if trial.repeat == 1]
     if len(first) > 1:
         raise typer.BadParameter(

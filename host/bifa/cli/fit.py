@@ -1,4 +1,4 @@
-"""`bifa fit`: the model's parameters from a data set, with their uncertainty."""
+"""`bifa fit`: fit the model's parameters to a data set, with their uncertainty."""
 
 import shlex
 from pathlib import Path
@@ -18,14 +18,14 @@ EXAMPLES = (
 def fit(
     dataset: Annotated[Path, DATASET],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
-    model: Annotated[Path | None, file_option("Base model to start from; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Base model to start from (default: the nominal one).")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report.")] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
 ) -> None:
-    """Identify the model (the paper's section IV): what static loadings, rests and sensors say by themselves, then
-    everything together. Reports each parameter with its 90 % interval, what the data do not determine, and the error
-    in units of the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: every condition as
-    measured and as modelled, like the paper's Figs. 4 to 6.
+    """Identify the model (the paper's section IV), first from static loadings, rests and sensors separately, then
+    jointly from everything. Reports each parameter with its 90 % interval, what the data do not determine, and the
+    error in units of the noise, and writes a model file for `bifa simulate` and `bifa optimize`. The pictures show
+    every condition as measured and as modelled, like the paper's Figs. 4 to 6.
     """
     from bifa.files import check_targets, written_into
 

@@ -13,12 +13,14 @@ EXAMPLES = ("bifa flash", f"bifa flash --port {EXAMPLE_PORT}", "bifa flash --bui
 
 
 def flash(
-    port: Annotated[str | None, port_option("The Uno's serial port; detected if left out.")] = None,
+    port: Annotated[str | None, port_option("The Uno's serial port (default: detected).")] = None,
     build_only: Annotated[bool, typer.Option("--build-only", help="Build the image but do not write it.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show the full output of the tools.")] = False,
 ) -> None:
-    """Write the firmware to the Uno, and check that it answers: in a clone of the repository the one that PlatformIO
-    builds there, elsewhere the one that belongs to this installation, by avrdude.
+    """Write the firmware to the Uno, and check that it answers.
+
+    In a clone of the repository, PlatformIO builds and writes it; elsewhere, avrdude writes the image that comes with
+    this installation.
 
     Vent the supplies first: while the bootloader runs, the valve pins float, and only the gates' pull-downs
     keep the valves off.
@@ -29,7 +31,9 @@ def flash(
     from bifa.toolchain import build_image, choose_port, find_project, project_folder
 
     console = Console()
-    on_line: Callable[[str], None] = console.out if verbose else lambda _: None  # unless a tool fails
+    on_line: Callable[[str], None] = (
+        console.out if verbose else lambda _: None
+    )  # a tool that fails shows its output anyway
     project = project_folder() if build_only else find_project()
     chosen = None if build_only else choose_port(port)
     if project is not None:

@@ -1,4 +1,4 @@
-"""`bifa gaits`: the library of gaits, and the command that makes it."""
+"""`bifa gaits`: list the library of gaits, or recompute it."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,16 +16,16 @@ EXAMPLES = ("bifa gaits", "bifa gaits --make", "bifa gaits --make --model mine.t
 
 def gaits(
     make: Annotated[bool, typer.Option("--make", help="Rerun the searches (minutes) and write the gaits.")] = False,
-    model: Annotated[Path | None, file_option("Model to search on; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Model to search on (default: the nominal one).")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder where --make writes; the package itself if left out.")
+        Path | None, typer.Option(help="Folder that --make writes to (default: the package itself).")
     ] = None,
     only: Annotated[
         list[str], typer.Option(help="Only this gait; repeatable.", metavar="GAIT", autocompletion=gait_names)
     ] = [],  # noqa: B006
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the searches; 0 if left out.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Random seed of the searches (default: 0).")] = None,
 ) -> None:
-    """List the gaits for scenarios, with predicted speeds and files for `bifa upload`; or recompute them."""
+    """List the library's gaits, with predicted speeds and files for `bifa upload`, or recompute them."""
     from rich.table import Table
 
     from bifa.files import check_targets
@@ -44,7 +44,7 @@ def gaits(
     title = "Gaits of the nominal robot: mm/s; head, tail ahead; vacuum of body, head, tail"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for heading in ("gait", "speed", "9 in 10", "period, s", "ahead, °", "vacuum"):
-        table.add_column(heading, no_wrap=heading != "vacuum")  # which yields where it is narrow
+        table.add_column(heading, no_wrap=heading != "vacuum")  # wraps on narrow terminals
     for name in names:
         entry = library.load(name)
         gait, notes = entry.gait, entry.provenance

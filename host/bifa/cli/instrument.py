@@ -1,4 +1,4 @@
-"""`bifa instrument`: how an instrument writes its files, proposed from one of them, asked about, and declared."""
+"""`bifa instrument`: declare the format of an instrument's files, proposed from one of them and confirmed by you."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -25,17 +25,17 @@ _MOST_PLOTS = 8
 def instrument(
     file: Annotated[
         Path | None,
-        typer.Argument(help="An export of the instrument.", show_default=False, exists=True, dir_okay=False),
+        typer.Argument(help="A file that the instrument exported.", show_default=False, exists=True, dir_okay=False),
     ] = None,
-    role: Annotated[str | None, typer.Option(help="machine or camera; otherwise you are asked.")] = None,
+    role: Annotated[str | None, typer.Option(help="machine or camera (default: you are asked).")] = None,
     bench: Annotated[Path, typer.Option(help="File to write the declaration to.")] = BENCH_FILE,
-    presets: Annotated[bool, typer.Option("--presets", help="List the programs whose exports are known.")] = False,
+    presets: Annotated[bool, typer.Option("--presets", help="List the programs whose formats are known.")] = False,
 ) -> None:
-    """Look at an instrument's export, and declare how it is written.
+    """Inspect a file exported by an instrument, and declare its format.
 
-    Shows the names of its columns, its first rows, its row of units and a small plot of each of the first eight
-    columns, proposes which column is what, and asks. The declaration is checked on the file and written into the
-    bench's file, from where `bifa campaign` and `bifa experiment` read it. Nothing is declared without asking you.
+    Shows the column names, the first rows, the row of units and a small plot of each of the first eight columns,
+    proposes what each column is, and asks. The declaration is checked by reading the file, and written into the bench
+    file, where `bifa campaign` and `bifa experiment` look for it. Nothing is declared without asking you.
     """
     from bifa.data.export import presets as known
     from bifa.screen import Console
@@ -58,14 +58,14 @@ def instrument(
     check_targets(bench, inputs=(file,))
     seen = look(file)
     _show(console, file, seen)
-    role = role or _choice("Whose file is it?", _ROLES, None)
+    role = role or _choice("Which instrument wrote it?", _ROLES, None)
     if role in read_exports(bench):
         raise BifaError(
-            f"{bench} declares [instrument.{role}] already: remove that table first, or name another --bench"
+            f"{bench} already declares [instrument.{role}]: remove that table first, or name another --bench"
         )
     table = _asked(console, seen, role)
     text = declaration(role, table)
-    console.print(f"\n{text}")  # before it is proved: what was answered is not lost where that fails
+    console.print(f"\n{text}")  # before it is checked, so that the answers are not lost if that fails
     _prove(console, file, role, table)
     if typer.confirm(f"Write this into {bench}?", default=False):
         before = bench.read_text(encoding="utf-8") if bench.exists() else ""
@@ -74,7 +74,7 @@ def instrument(
 
 
 def _show(console: "Console", file: Path, seen: "Look") -> None:
-    """What was seen: how it is written, names, units, rows, plots."""
+    """Show what was found in the file: format, names, units, rows, plots."""
     import numpy as np
 
     from bifa.data.errors import DatasetError
@@ -83,10 +83,13 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
     from bifa.report.terminal import print_table
 
     plain = not console.encoding.lower().startswith("utf")
-    how = ", ".join(f"{key} {value!r}" for key, value in seen.how.items()) or "commas, points, names in the first line"
+    how = (
+        ", ".join(f"{key} {value!r}" for key, value in seen.how.items())
+        or "comma-separated, decimal points, names in the first line"
+    )
     console.print(f"{file}: {how}; {len(seen.sheet)} rows from line {seen.sheet.line(0)} on")
     for role, name in seen.presets.items():
-        console.print(f"As a {role}'s it is read by the preset {name}.")
+        console.print(f"As the file of a {role}, it matches the preset {name}.")
     labels, units = seen.sheet.labels(), seen.sheet.units
     rows = [[label, unit, *row] for label, unit, row in zip(labels, units, zip(*seen.rows(), strict=True), strict=True)]
     print_table(console, PageTable(["column", "units row", *["row"] * len(seen.rows())], rows, ""))
@@ -103,7 +106,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
 
 
 def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
-    """The declaration, question by question; Enter takes what is proposed in brackets."""
+    """Ask for the declaration, question by question; Enter accepts the proposal in brackets."""
     from bifa.data.export import units_for
     from bifa.measure.propose import parsed, wanted
 
@@ -124,7 +127,7 @@ def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
             continue
         columns[name] = column
         told = seen.unit(name, column.split(" + ")[0]) or (given.units.get(name) if given else None)
-        units[name] = _choice(f"In which unit is {column!r}?", units_for(name), told)
+        units[name] = _choice(f"What is the unit of {column!r}?", units_for(name), told)
         if name != "time_s" and typer.confirm(f"Reverse the sign of {name}?", default=False):
             sign[name] = -1
         more |= _clock(units[name], given) if name == "time_s" else {}
@@ -146,7 +149,7 @@ def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -
 
 
 def _is_there(console: "Console", seen: "Look", column: str) -> bool:
-    """Whether the export has the column; where it has not, that is said."""
+    """Whether the export has the column; prints an error if it has not."""
     from bifa.data.errors import DatasetError
 
     try:
@@ -162,26 +165,26 @@ def _choice(question: str, allowed: list[str], proposed: str | None) -> str:
         answer = typer.prompt(f"{question} ({', '.join(allowed)})", default=proposed)
         if answer in allowed:
             return answer
-        typer.echo(f"one of {', '.join(allowed)}")
+        typer.echo(f"answer one of {', '.join(allowed)}")
 
 
 def _clock(unit: str, given: "Export | None") -> dict[str, Any]:
-    """What else is needed where times are frames or dates."""
+    """Ask for what else is needed to read times given as frames or dates."""
     if unit == "frame":
         return {"rate_hz": typer.prompt("Frames per second?", default=given.rate_hz if given else None, type=float)}
     if unit != "date":
         return {}
     form = typer.prompt("Date format (strptime; Enter: ISO 8601)?", default="", show_default=False)
-    zone = typer.prompt("Time zone, if the dates name none (e.g. Europe/Berlin; Enter: UTC)?", default="UTC")
+    zone = typer.prompt("Time zone, if the dates include none (e.g. Europe/Berlin; Enter: UTC)?", default="UTC")
     return ({"date_format": form} if form else {}) | ({"zone": zone} if zone != "UTC" else {})
 
 
 def _sync(console: "Console", seen: "Look") -> dict[str, Any]:
-    """Where the strobe's edges are recorded."""
+    """Ask where the strobe's edges are recorded."""
     while True:
         answer = typer.prompt(
-            "Where is the strobe (D10)? file: edges in a file beside it; frames: every row is a frame that it "
-            "triggered; or the column in which it was sampled",
+            "Where is the strobe (D10) recorded? file: its edges are in a file beside this one; frames: it triggered "
+            "every row as a frame; or the name of the column that sampled it",
             default="file",
         )
         if answer == "file":
@@ -189,11 +192,16 @@ def _sync(console: "Console", seen: "Look") -> dict[str, Any]:
         if answer == "frames":
             return {"sync": "frames"}
         if _is_there(console, seen, answer):
-            return {"sync": {"column": answer, "threshold": typer.prompt("High above?", default=2.5, type=float)}}
+            return {
+                "sync": {
+                    "column": answer,
+                    "threshold": typer.prompt("Threshold above which it is high?", default=2.5, type=float),
+                }
+            }
 
 
 def _prove(console: "Console", file: Path, role: str, table: dict[str, Any]) -> None:
-    """Read the file as declared, and say what comes out; DatasetError if that fails."""
+    """Read the file as declared, and print what it contains; raises DatasetError if that fails."""
     import numpy as np
 
     from bifa.data.export import read_export
@@ -207,5 +215,5 @@ def _prove(console: "Console", file: Path, role: str, table: dict[str, Any]) -> 
     for name, values in columns.items():
         known = values[np.isfinite(values)]
         gaps = len(values) - len(known)
-        told = f"{known.min():.6g} to {known.max():.6g}" if len(known) else "nothing"
+        told = f"{known.min():.6g} to {known.max():.6g}" if len(known) else "no values"
         console.print(f"  {name}: {told}{f', {gaps} empty' if gaps else ''}")

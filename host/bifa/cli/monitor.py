@@ -22,22 +22,24 @@ def monitor(
     port: Annotated[str | None, PORT] = None,
     gait: Annotated[Path | None, file_option("Upload this gait first.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Start walking.")] = False,
-    web: Annotated[bool, typer.Option("--web", help="Open a page in the browser, with sliders for the gait.")] = False,
+    web: Annotated[
+        bool, typer.Option("--web", help="Serve a page for the browser, with sliders for the gait.")
+    ] = False,
     web_port: Annotated[
         int | None,
-        typer.Option(min=0, max=65535, help=f"Port of the page, {_WEB_PORT} if left out; 0: any free one."),
+        typer.Option(min=0, max=65535, help=f"Port of the page (default: {_WEB_PORT}); 0 takes any free one."),
     ] = None,
-    model: Annotated[Path | None, file_option("Model for the page's predictions; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Model for the page's predictions (default: nominal).")] = None,
     seconds: Annotated[
         float | None, typer.Option(min=0.1, help="Stop after this many seconds (default: until Ctrl-C).")
     ] = None,
 ) -> None:
     """Watch the robot: pressures over the last seconds, valves, phases, and samples lost on the link.
 
-    With --web the page is served on this computer only, at the printed address; whoever has it can change the gait,
-    walk and stop. There is a stop button, which shows when the Uno has confirmed.
+    With --web, a page is served to this computer only, at the printed address; anyone who has the address can change
+    the gait, walk and stop. The page has a stop button, which shows when the Uno has confirmed the stop.
 
-    Opening the port restarts an Uno. At the end, Ctrl-C included, all valves are off.
+    Opening the port restarts the Uno. When the command ends, also by Ctrl-C, all valves are off.
     """
     if not web:
         requires("--web", model=model, web_port=web_port)

@@ -1,4 +1,4 @@
-"""`bifa optimize`: from a model to the gait that a real robot will walk."""
+"""`bifa optimize`: find the gait for a real robot, from a model of it."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -31,42 +31,45 @@ EXAMPLES = (
 
 def optimize(
     out: Annotated[Path, typer.Option(help="Gait file to write.", show_default=False)],
-    model: Annotated[Path | None, file_option("Model file; the paper's nominal robot if left out.")] = None,
-    method: Annotated[Method, typer.Option(help="Search method; bo is the paper's, and slow.")] = "cma",
+    model: Annotated[Path | None, file_option("Model file (default: the paper's nominal robot).")] = None,
+    method: Annotated[Method, typer.Option(help="Search method; bo, the paper's, is slow.")] = "cma",
     robust: Annotated[
         bool,
-        typer.Option("--robust/--nominal", help="Maximise the speed that 9 robots in 10 reach, or the model's own."),
+        typer.Option("--robust/--nominal", help="Maximise the speed that 9 in 10 robots reach, or the model's own."),
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="Random seed of the search and of the sampled robots.")] = 0,
     evaluations: Annotated[
         int | None,
-        typer.Option(min=20, help="Greatest number of gaits to evaluate per run; 1000 for bo.", show_default=False),
+        typer.Option(min=20, help="Maximum number of gaits to evaluate per run; 1000 for bo.", show_default=False),
     ] = None,
     runs: Annotated[
         int | None,
-        typer.Option(min=1, max=20, help="Runs, each with the next seed; 3 for bo, else 1.", show_default=False),
+        typer.Option(
+            min=1, max=20, help="Number of runs, each with the next seed; 3 for bo, else 1.", show_default=False
+        ),
     ] = None,
     spread: Annotated[
         float | None,
         typer.Option(
-            help="Relative sd of every parameter; by default what the model's fit knows, else a guess of 0.02."
+            help="Relative standard deviation of every parameter (default: from the model's fit, else a guess of 0.02)."
         ),
     ] = None,
     begin: Annotated[
-        list[Path] | None, file_option("Gait known to walk, from which the search begins as well; repeatable.")
+        list[Path] | None, file_option("Gait known to walk, used as a further start of the search; repeatable.")
     ] = None,
-    period: Annotated[tuple[float, float], typer.Option(help="Range of the period in s.")] = (2.0, 4.0),
+    period: Annotated[tuple[float, float], typer.Option(help="Range of periods to search, in s.")] = (2.0, 4.0),
     dask: Annotated[str | None, typer.Option(help=cluster.HELP)] = None,
     dask_ca: Annotated[Path | None, typer.Option(help=cluster.CA_HELP)] = None,
     dask_cert: Annotated[Path | None, typer.Option(help=cluster.CERT_HELP)] = None,
     dask_key: Annotated[Path | None, typer.Option(help=cluster.KEY_HELP)] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
-    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Draw nothing.")] = False,
+    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Do not draw pictures.")] = False,
 ) -> None:
     """Find the gait that maximises the settled speed, verified with a finer step.
 
-    By default the 10th percentile of the speed over the model's uncertainty is maximised, since the fastest nominal
-    gait, which may not slip, collapses under a 1 % change. Pictures go to a folder next to the gait file by default.
+    By default, the 10th percentile of the speed over the model's uncertainty is maximised: the fastest gait of the
+    model itself may have no slip at all, and then collapses if a parameter changes by 1 %. Pictures go to a folder next
+    to the gait file by default.
     """
     from bifa.files import check_targets, written_into
 
@@ -117,7 +120,7 @@ def optimize(
 
 
 def pictures_beside(out: Path) -> Path:
-    """The folder for the pictures: named as the gait file, unless that is the file itself or a data set."""
+    """Folder for the pictures: the gait file's name without suffix, unless that is the file itself or a data set."""
     out = named(out)
     folder = out.with_suffix("")
     taken = folder == out or (folder / "dataset.toml").exists()
@@ -126,7 +129,7 @@ def pictures_beside(out: Path) -> Path:
 
 @contextmanager
 def search_progress(console: "Console") -> Iterator[Callable[[str], Callable[[str, float, float], None]]]:
-    """Gives a function: title -> what `optimize` reports progress to."""
+    """Show progress bars; yields a function that adds one by its title and returns the callback for `optimize`."""
     from rich.progress import BarColumn, Progress, TimeElapsedColumn
 
     from bifa.screen import words
@@ -181,7 +184,7 @@ def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folde
     from bifa.simulate import gait_rows, plant
 
     flat, settings = plant(robot), optimum.settings
-    # Judged alike: at a cliff other robots tell another story.
+    # The same robots as in the verification: near a cliff, other robots would give different results.
     robots = SearchRun(robot, pool, optimum.spread, settings).verifying_robots()
     metric = replace(settings.rules.in_full(), tolerance_m=FINE_M)
     before, after = anatomy(robot, BASELINE), anatomy(robot, optimum.gait)

@@ -1,4 +1,4 @@
-"""`bifa record`: walks as a data set, or, without instruments, the Uno's telemetry."""
+"""`bifa record`: record walks as a data set or, without instruments, the Uno's telemetry."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,28 +16,28 @@ EXAMPLES = (
 
 
 def record(
-    out: Annotated[Path, typer.Option(help="New folder, or that of an interrupted recording.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="A new folder, or that of an interrupted recording.", show_default=False)],
     port: Annotated[str | None, PORT] = None,
     gait: Annotated[
-        Path | None, file_option("Gait to walk; otherwise the baseline, or no walk (without instruments).")
+        Path | None, file_option("Gait to walk (default: the baseline; without instruments, no walk).")
     ] = None,
     cycles: Annotated[
-        int | None, typer.Option(min=1, help=f"Cycles per walk, {_CYCLES} if left out (with instruments).")
+        int | None, typer.Option(min=1, help=f"Cycles per walk (default: {_CYCLES}; only with instruments).")
     ] = None,
     repeats: Annotated[
-        int | None, typer.Option(min=1, help=f"Number of walks, {_REPEATS} if left out (with instruments).")
+        int | None, typer.Option(min=1, help=f"Number of walks (default: {_REPEATS}; only with instruments).")
     ] = None,
     seconds: Annotated[
         float | None,
-        typer.Option(min=0.1, help="Stop after this many seconds (without instruments; default: until Ctrl-C)."),
+        typer.Option(min=0.1, help="Stop after this many seconds (default: until Ctrl-C; only without instruments)."),
     ] = None,
 ) -> None:
-    """Record walks. On a rig with motion capture: a data set for `bifa check` and `bifa diagnose`.
+    """Record walks as a data set or, without instruments, the Uno's telemetry.
 
-    On a bare Uno: a folder with telemetry (pressures, commands, phases, the Uno's and the computer's time), written as
-    it arrives. If the port vanishes, the data recorded so far are kept, and recording resumes when the same Uno is
-    back; before it walks again, you are asked.
-    An interrupted command is resumed by running it again.
+    A rig with motion capture yields a data set for `bifa check` and `bifa diagnose`. A bare Uno yields a folder with
+    telemetry (pressures, commands, phases, the Uno's and the computer's time), written as it arrives. If the port
+    vanishes, the data recorded so far are kept, and recording resumes when the same Uno is back; you are asked before
+    it walks again. Run an interrupted command again to resume it.
     """
     from bifa.files import check_targets
     from bifa.rig import check_port
@@ -59,7 +59,7 @@ def record(
         if has_instruments:
             requires("a rig without instruments", seconds=seconds)
             console.print(f"gait: {gait or 'the baseline'}, {steps}")
-            with stoppable(lambda: f"valves off; {kept(out, 'finished walk')}; the same command resumes"):
+            with stoppable(lambda: f"valves off; {kept(out, 'finished walk')}; run the same command to resume"):
                 record_walks(rig, port, out, gait, cycles or _CYCLES, repeats or _REPEATS, console)
     if not has_instruments:
         requires("a rig with instruments", cycles=cycles, repeats=repeats)

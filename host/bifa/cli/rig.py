@@ -1,4 +1,4 @@
-"""`bifa rig`: the virtual bench on a pseudo-terminal in real time, for people and for any serial program."""
+"""`bifa rig`: serve the virtual bench on a pseudo-terminal in real time, for any serial program."""
 
 import math
 from pathlib import Path
@@ -21,23 +21,21 @@ def rig(
     profile: Annotated[Profile, PROFILE] = "ideal",
     effect: Annotated[
         list[str] | None,
-        typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; repeatable.", autocompletion=effects),
+        typer.Option(help="Effect: NAME or NAME:PARAMETER=VALUE,...; repeatable.", autocompletion=effects),
     ] = None,
     sealed: Annotated[
-        int | None, typer.Option(min=0, help="Seed that draws a robot with an undisclosed effect.")
+        int | None, typer.Option(min=0, help="Draw a robot with an undisclosed effect, from this seed.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of noise, clocks and run-to-run variation.")] = 0,
-    firmware: Annotated[
-        Path | None, typer.Option(help="Firmware image (ELF or HEX); the built one if left out.")
-    ] = None,
+    firmware: Annotated[Path | None, typer.Option(help="Firmware image, ELF or HEX (default: the built one).")] = None,
     eeprom: Annotated[
         Path | None, typer.Option(help="File that keeps the EEPROM between runs.", dir_okay=False)
     ] = None,
-    link: Annotated[Path | None, typer.Option(help="Symbolic link to the pty while it is served.")] = None,
+    link: Annotated[Path | None, typer.Option(help="Symbolic link to create to the pty while it is served.")] = None,
 ) -> None:
-    """Offer the virtual robot, with the real firmware, as a serial port in real time.
+    """Serve the virtual robot, running the real firmware, as a serial port in real time.
 
-    Opening the port resets the board, as with a real Uno. 250000 baud; any serial program will do.
+    Opening the port resets the board, as with a real Uno. Any serial program can connect, at 250000 baud.
     """
     import os
     import signal

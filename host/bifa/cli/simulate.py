@@ -1,4 +1,4 @@
-"""`bifa simulate`: walk a model with a gait; or the paper's figures beside the model's."""
+"""`bifa simulate`: simulate a walk, or compare the model with the paper's figures."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -31,8 +31,8 @@ EXAMPLES = (
 
 
 def simulate(
-    model: Annotated[Path | None, file_option("Model file; the nominal model if left out.")] = None,
-    gait: Annotated[Path | None, file_option("Gait file; the paper's baseline if left out.")] = None,
+    model: Annotated[Path | None, file_option("Model file (default: the nominal model).")] = None,
+    gait: Annotated[Path | None, file_option("Gait file (default: the paper's baseline).")] = None,
     cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = _CYCLES,
     inclination: Annotated[
         float, typer.Option(help="Pipe inclination in degrees (positive = uphill).", min=-90, max=90)
@@ -45,26 +45,28 @@ def simulate(
     buckling: Annotated[
         float | None,
         typer.Option(
-            help=f"Force in N that buckles a ring of an --obstacle's supports; {_BUCKLING_N:g}, assumed, if left out."
+            help=f"Force in N that buckles a ring of supports under an --obstacle (default: {_BUCKLING_N:g}, assumed)."
         ),
     ] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
-    out: Annotated[Path | None, typer.Option(help="CSV of all channels at 100 Hz, as a data set's locomotion.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write all channels at 100 Hz as CSV, like a data set's walk.")
+    ] = None,
     paper: Annotated[
         bool,
         typer.Option(
             "--paper",
-            help="Compare the paper's figures and obstacles with the model's; --gait: its fastest gait.",
+            help="Compare the model with the paper's figures and obstacles; --gait names the model's fastest gait.",
         ),
     ] = False,
 ) -> None:
-    """Simulate a walk and print the advance of each cycle; its picture shows commands, pressures and displacement.
+    """Simulate a walk and print the advance of each cycle; --pictures plots commands, pressures and displacement.
 
-    The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
+    Effects in the model file (`bifa diagnose` adds them) act here as they did in the data.
     """
     walks = (cycles, inclination, payload, obstacle, buckling, pictures, out)
     if paper and walks != (_CYCLES, 0.0, 0.0, None, None, None, None):
-        raise typer.BadParameter("--paper simulates walks of its own; only --model and --gait can be combined with it")
+        raise typer.BadParameter("--paper simulates its own walks; only --model and --gait can be combined with it")
     if not obstacle:
         requires("--obstacle", buckling=buckling)
 
@@ -79,7 +81,9 @@ def simulate(
     chosen = robot.load_model(model) if model else robot.nominal()
     file = robot.read_gait_file(gait) if gait else robot.GaitFile(robot.BASELINE)
     if file.others:
-        console.print(f"not simulated: {', '.join(file.others)} (the Uno's; the model has its own supply pressure)")
+        console.print(
+            f"not simulated: {', '.join(file.others)} (for the Uno only; the model has its own supply pressure)"
+        )
     if paper:
         _print_paper(console, chosen if model or gait else None, file.gait if gait else None)
         return
@@ -127,13 +131,13 @@ def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Adv
     if found.is_settled:
         console.print(f"settled from cycle {found.begins + 1} on")
     elif found.cycles < LEAST:
-        console.print("its last cycles are too few to tell whether it settles; try more --cycles")
+        console.print("too few cycles to tell whether it settles; try more --cycles")
     else:
-        console.print(f"not settled: its last {found.cycles} cycles vary by {found.varies:.1%}; try more --cycles")
+        console.print(f"not settled: the last {found.cycles} cycles vary by {found.varies:.1%}; try more --cycles")
 
 
 def _print_prediction(console: "Console", model: "Model", gait: "Gait") -> None:
-    """What a robot will do that is known as the model is."""
+    """Print the speed predicted for a robot, given what the model's fit knows about it."""
     from bifa.gait import predict_speed, spread_of
 
     known = spread_of(model)
@@ -164,7 +168,7 @@ def _print_passing(
 
 
 def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None") -> None:
-    """Both shipped models with their fastest gaits, or one model and gait."""
+    """Compare both shipped models with their fastest gaits, or one model and gait, with the paper."""
     from rich.table import Table
     from rich.text import Text
 
@@ -187,13 +191,15 @@ def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None")
 
 
 def _print_obstacles(console: "Console", model: "Model", fast: "Gait") -> None:
-    """The paper's section VI.B: who gets through, and which stroke is too short for it."""
+    """Print the paper's section VI.B: which gaits pass an obstacle, and which strokes build up too little force."""
     from rich.table import Table
     from rich.text import Text
 
     from bifa.simulate.paper import obstacle_rows
 
-    title = Text.assemble(f"Obstacles, {model.name}: N that a stroke builds up / needs; ", _RED, ": not enough")
+    title = Text.assemble(
+        f"Obstacles, {model.name}: force in N that a stroke builds up / needs; ", _RED, ": not enough"
+    )
     headings = ("obstacle", "gait", "through", "extension", "contraction")
     table = Table(*headings, title=title, title_justify="left")
     for obstacle, gait, outcome in obstacle_rows(model, fast):

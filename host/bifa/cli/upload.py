@@ -1,4 +1,4 @@
-"""`bifa upload`: a gait file onto the Uno, as a whole or not at all."""
+"""`bifa upload`: send a gait file to the Uno, as a whole or not at all."""
 
 from pathlib import Path
 from typing import Annotated
@@ -23,14 +23,14 @@ def upload(
         ),
     ],
     port: Annotated[str | None, PORT] = None,
-    save: Annotated[str | None, typer.Option(help="Keep it on the Uno as a preset of this name.")] = None,
+    save: Annotated[str | None, typer.Option(help="Also save it on the Uno as a preset of this name.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Then walk until Ctrl-C.")] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="With --run: stop after this many seconds.")] = None,
 ) -> None:
-    """Send a gait to the Uno and read it back; the parameters that the file does not name stay as they are.
+    """Send a gait to the Uno and read it back; parameters that the file does not name keep their values.
 
-    Opening the port restarts an Uno: it stops walking, and comes back with its start preset. At the end of --run all
-    valves are off.
+    Opening the port restarts the Uno: it stops walking and loads its start preset. When --run ends, all valves are
+    off.
     """
     if not run:
         requires("--run", seconds=seconds)

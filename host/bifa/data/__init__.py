@@ -1,4 +1,4 @@
-"""Measured data: the data set's format, read strictly, written safely."""
+"""Measured data: strict reading and safe writing of data sets."""
 
 from .dataset import Dataset, Trial
 from .errors import DatasetError

@@ -1,4 +1,4 @@
-"""A data set in memory: what was known beforehand, and the trials."""
+"""A data set in memory: its trials, and what was known beforehand."""
 
 from collections import defaultdict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -16,9 +16,9 @@ from .layout import EXPERIMENTS, SETTINGS
 class Trial:
     """One recording.
 
-    `columns` maps a column's name, its unit included, to an array of shape (samples,), in the order of the
-    file. `pressure_psi` and `rate_mm_s` are what was commanded. `gait` is keyed as in a gait file. `extra`
-    holds the settings named in `layout.SETTINGS` and whatever else the recorder noted.
+    `columns` maps the name of a column, including its unit, to an array of shape (samples,), in the order of the
+    file. `pressure_psi` and `rate_mm_s` are commanded values. `gait` is keyed as in a gait file. `extra`
+    holds the settings named in `layout.SETTINGS` and anything else that was noted during recording.
     """
 
     file: str
@@ -39,22 +39,22 @@ class Trial:
 
     @property
     def commanded_psi(self) -> float:
-        """`pressure_psi`, of an experiment at one; DatasetError where there is none."""
+        """`pressure_psi`, for experiments that set it; raises DatasetError if it is None."""
         return float(self._given("pressure_psi"))
 
     @property
     def commanded_mm_s(self) -> float:
-        """`rate_mm_s`, of a static loading or an anchor pull; DatasetError where there is none."""
+        """`rate_mm_s`, for static loadings and anchor pulls; raises DatasetError if it is None."""
         return float(self._given("rate_mm_s"))
 
     @property
     def tested(self) -> str:
-        """`actuator`, of a static loading or a step response; DatasetError where there is none."""
+        """`actuator`, for static loadings and step responses; raises DatasetError if it is None."""
         return str(self._given("actuator"))
 
     @property
     def walked(self) -> dict[str, float]:
-        """`gait`, of a walk; DatasetError where there is none."""
+        """`gait`, for walks; raises DatasetError if it is None."""
         return dict(self._given("gait"))
 
     def _given(self, name: str) -> Any:
@@ -70,12 +70,12 @@ class Trial:
 
     @property
     def nominal_rate_hz(self) -> float:
-        """The rate that the format gives for this experiment."""
+        """Sampling rate that the format specifies for this experiment."""
         return EXPERIMENTS[self.experiment].rate_hz
 
     @property
     def condition(self) -> Hashable:
-        """Everything that was set; trials with equal conditions are repeats of each other."""
+        """All settings of the trial; trials with equal conditions are repeats of each other."""
         gait = None if self.gait is None else tuple(sorted(self.gait.items()))
         settings = tuple((key, self.extra[key]) for key in SETTINGS if key in self.extra)
         return (self.experiment, self.actuator, self.pressure_psi, self.rate_mm_s, gait, settings)
@@ -101,7 +101,7 @@ class Trial:
         return ", ".join(parts)
 
     def to_pandas(self) -> Any:
-        """The columns as a DataFrame over time; the condition and the repeat in its `attrs`."""
+        """Return the columns as a DataFrame over time, with file, condition and repeat in its `attrs`."""
         import pandas
 
         columns = {name: column for name, column in self.columns.items() if name != "time_s"}
@@ -110,10 +110,10 @@ class Trial:
         return frame
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw every column over time, one quantity below the other; returns the figure."""
+        """Plot every column over time, in one panel per quantity; returns the figure."""
         import matplotlib.pyplot as plt
 
-        groups: dict[str, list[str]] = defaultdict(list)  # by quantity, which is what a column's name begins with
+        groups: dict[str, list[str]] = defaultdict(list)  # by quantity, the first word of a column's name
         for name in self.columns:
             if name != "time_s":
                 groups[name.split("_")[0]].append(name)
@@ -138,7 +138,7 @@ class Trial:
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """Trials and what the lab measured directly (`known`: model parameter -> value, SI unless suffixed). `exports`: how
-    the instruments wrote the files, where that is declared; what bifa writes is in the data set's own form."""
+    the instruments wrote the files, if declared; bifa itself writes files in the data set's own form."""
 
     path: Path | None
     name: str
@@ -149,29 +149,29 @@ class Dataset:
 
     @property
     def folder(self) -> Path:
-        """`path`, of a data set on disk; DatasetError where it is in memory only."""
+        """`path` of a data set on disk; raises DatasetError if the data set is in memory only."""
         if self.path is None:
             raise DatasetError(f"{self.name!r} is in memory only: write it first")
         return self.path
 
     def of(self, experiment: str, actuator: str | None = None) -> tuple[Trial, ...]:
-        """The trials of one experiment, of one actuator where given."""
+        """Return the trials of one experiment, optionally of one actuator only."""
         return tuple(
             trial for trial in self.trials if trial.experiment == experiment and actuator in (None, trial.actuator)
         )
 
     def last_repeat(self, condition: Hashable) -> int:
-        """The highest number of a repeat of a condition; 0 where there is none."""
+        """Return the highest repeat number of a condition, 0 if it has no trial."""
         return max((trial.repeat for trial in self.trials if trial.condition == condition), default=0)
 
     def to_pandas(self) -> Any:
-        """All trials below one another, by file and time."""
+        """Return all trials in one DataFrame, indexed by file and time."""
         import pandas
 
         return pandas.concat({trial.file: trial.to_pandas() for trial in self.trials}, names=["file"])
 
     def repeats(self) -> Iterator[tuple[Trial, ...]]:
-        """Groups of trials that repeat one condition, in the order in which they first appear."""
+        """Yield groups of trials that repeat one condition, in order of first appearance."""
         groups: dict[Hashable, list[Trial]] = defaultdict(list)
         for trial in self.trials:
             groups[trial.condition].append(trial)
@@ -179,7 +179,7 @@ class Dataset:
 
 
 def conditions_of(dataset: Dataset) -> dict[str, str]:
-    """What the condition of each trial is called, by file: its label, and by what gaits of one label differ."""
+    """Name the condition of each trial, by file: its label, plus the gait parameters that tell equal labels apart."""
     alike: dict[str, list[tuple[Trial, ...]]] = defaultdict(list)
     for group in dataset.repeats():
         alike[group[0].label].append(group)
@@ -198,6 +198,6 @@ def _is_same(name: str, gaits: Sequence[Mapping[str, float]]) -> bool:
 
 
 def labels_of(dataset: Dataset) -> dict[str, str]:
-    """What each trial is called in a few words, its repeat among them, by file."""
+    """Name each trial, by file: its condition and its repeat."""
     called = conditions_of(dataset)
     return {trial.file: f"{called[trial.file]} (run {trial.repeat})" for trial in dataset.trials}

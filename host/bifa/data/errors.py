@@ -1,4 +1,4 @@
-"""The one error of this package: it says which file, line and column is at fault."""
+"""The error class of this package, which names the file, line and column at fault."""
 
 from bifa.errors import BifaError
 from bifa.printable import printable
@@ -7,8 +7,8 @@ from bifa.printable import printable
 class DatasetError(BifaError):
     """A data set cannot be read or written.
 
-    `file` is relative to the data set, `line` counts from 1, `column` is a column's name in a CSV file or
-    a key in dataset.toml; each is None where it has no meaning. `problem` is the sentence without the place.
+    `file` is relative to the data set, `line` counts from 1, `column` is the name of a column in a CSV file or
+    a key in dataset.toml; each is None if it does not apply. `problem` is the message without the location.
     """
 
     def __init__(self, problem: str, *, file: str | None = None, line: int | None = None, column: str | None = None):

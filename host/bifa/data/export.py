@@ -1,15 +1,16 @@
-"""How an instrument writes its files, declared once: read as they come, in the data set's own names and units.
+"""Declarations of how an instrument writes its files, so that exports can be read directly into the data set's own
+columns and units.
 
 ```toml
 [instrument.machine]
-preset = "bluehill"             # of bifa/data/presets; what stands below takes its place
+preset = "bluehill"             # from bifa/data/presets; the keys below override it
 columns = { displacement_mm = "Extension", force_N = "Load" }
-units = { force_N = "kN" }      # of the file
+units = { force_N = "kN" }      # in the file
 sign = { force_N = -1 }
 ```
 
-What is declared is read, and nothing is guessed: a column under another name needs its unit, and where the file has a
-row of units it has to say the same.
+Only what is declared is read, and nothing is guessed: a column under another name needs its unit, and if the file has
+a row of units, it has to agree.
 """
 
 from __future__ import annotations
@@ -38,27 +39,27 @@ _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600
 _LENGTHS = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "in": 25.4, "um": 1e-3}
 _FORCES = {"N": 1.0, "kN": 1000.0, "mN": 1e-3, "lbf": 4.4482216152605, "kgf": 9.80665, "gf": 9.80665e-3}
 _PRESSURES = {"psi": 1.0, "kPa": 0.1450377377, "bar": 14.50377377, "mbar": 0.01450377377, "MPa": 145.0377377}
-UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": _SECONDS}  # by what a column's name ends with
+UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": _SECONDS}  # by the suffix of a column's name
 _SPELT = {"sec": "s", "seconds": "s", "second": "s", "msec": "ms", "µm": "um", "inch": "in", "lb": "lbf", "volts": "v"}
 _SPELT |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
-_ROWS = {"skip_rows": 0, "header_rows": 1, "units_rows": 0}  # and the least of each
+_ROWS = {"skip_rows": 0, "header_rows": 1, "units_rows": 0}  # and the minimum of each
 _CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ",")}
-_TABLES = ("columns", "units", "factor", "sign", "offset")  # by the data set's columns
+_TABLES = ("columns", "units", "factor", "sign", "offset")  # keyed by the data set's columns
 _KEYS = ("preset", *_CHOICES, "separator", "encoding", *_ROWS, "header", "sheet", *_TABLES, "where", "sync")
 _KEYS += ("rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*$")
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
-_THRESHOLD = 2.5  # V, of a strobe of 5 V
+_THRESHOLD = 2.5  # V, for a strobe of 5 V
 SLOWEST_SYNC_S = 0.002  # the strobe is high for 2.6 ms
 
 
 @dataclass(frozen=True)
 class Export:
-    """What is declared of an instrument's files. `columns`: the export's own names, by the data set's, where they
-    differ; `units`, `factor`, `sign` and `offset` (added last) likewise; `where`: values of other columns in the rows
-    that count; `sync`: "file" (beside it), "frames" (every row was exposed at a strobe), or the name of the column in
-    which the strobe was sampled."""
+    """Declaration of how an instrument writes its files. `columns`: the export's column names, keyed by the data set's,
+    where they differ; `units`, `factor`, `sign` and `offset` (added last) are keyed likewise. `where`: values that
+    other columns must have in the rows that count. `sync`: "file" (a sync file beside it), "frames" (every row was
+    exposed at a strobe), or the name of the column in which the strobe was sampled."""
 
     name: str
     form: SheetForm
@@ -76,7 +77,7 @@ class Export:
 
     @property
     def needs_sync_file(self) -> bool:
-        """Whether the strobe's edges stand in a file of their own."""
+        """Whether the strobe's edges are in a separate file."""
         return self.sync == _SYNC_FILE
 
 
@@ -86,7 +87,7 @@ OWN_NAMES = Export("", SheetForm())
 def read_export(
     path: Path, export: Export, wanted: Iterable[str], optional: Iterable[str] = ()
 ) -> tuple[dict[str, np.ndarray], Sheet, np.ndarray]:
-    """As `read_columns`, from the file at `path`, and the sheet that it holds."""
+    """Like `read_columns`, from the file at `path`; returns columns, the file's sheet, and rows."""
     sheet = Sheet(path, export.form)
     columns, rows = read_columns(sheet, export, wanted, optional)
     return columns, sheet, rows
@@ -95,15 +96,15 @@ def read_export(
 def read_columns(
     sheet: Sheet, export: Export, wanted: Iterable[str], optional: Iterable[str] = ()
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Columns by the data set's names and in its units, NaN where a cell is empty; and which of the sheet's rows these
-    are. Raises DatasetError naming file, line, column and cell."""
+    """Read columns under the data set's names and in its units, NaN where a cell is empty, and the indices of the
+    sheet's rows that they come from. Raises DatasetError naming file, line, column and cell."""
     rows = _rows(sheet, export)
     there = [name for name in optional if name in export.columns or name in sheet.labels()]
     return {name: _column(sheet, export, name)[rows] for name in (*wanted, *there)}, rows
 
 
 def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarray) -> np.ndarray:
-    """When the strobe rose, by the record's own clock [s]; shape (edges,)."""
+    """Times at which the strobe rose, by the record's own clock [s]; shape (edges,)."""
     time_s = columns["time_s"]
     if export.sync == _SYNC_FRAMES:
         return time_s
@@ -111,7 +112,7 @@ def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, 
     step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else np.inf
     if step_s > SLOWEST_SYNC_S:
         raise sheet.error(
-            f"{export.sync} was sampled every {1e3 * step_s:.3g} ms: the strobe is high for 2.6 ms, so that it needs "
+            f"{export.sync} was sampled every {1e3 * step_s:.3g} ms: the strobe is high for only 2.6 ms, so it needs "
             f"{1.0 / SLOWEST_SYNC_S:.0f} samples a second; sample it faster, or have its edges stamped in a sync file"
         )
     high = level > export.threshold
@@ -119,7 +120,7 @@ def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, 
 
 
 def dated_edges(export: Export, sheet: Sheet, rows: np.ndarray, edges: Sheet) -> np.ndarray:
-    """Edges of a file of their own, [s] since the record's first row, where both write dates."""
+    """Times of the edges in a separate file, in s since the record's first row, if both files write dates."""
     first = _date_cells(sheet, export.columns.get("time_s", "time_s"))[rows[0]]
     cells = _date_cells(edges, "sync_time_s")
     return _seconds(edges, export, [first, *cells], "sync_time_s")[1:]
@@ -163,33 +164,33 @@ def _scale(export: Export, name: str) -> float:
 
 
 def _date_cells(sheet: Sheet, source: str) -> list[str]:
-    """Dates from one column, or from several that make one date together ("Date + Time")."""
+    """Dates from one column, or from several that together form one date ("Date + Time")."""
     parts = [sheet.cells(sheet.find(part)) for part in source.split(" + ")]
     return [" ".join(part) for part in zip(*parts, strict=True)]
 
 
 def _seconds(sheet: Sheet, export: Export, cells: list[str], source: str) -> np.ndarray:
-    """Seconds since the first of these dates."""
+    """Seconds since the first of the dates in `cells`."""
     zone, moments = _zone(export.zone) if export.zone else None, []
     for row, cell in enumerate(cells):
         try:
             moments.append(_moment(cell, export.date_format, zone))
         except ValueError:
-            form = f"of the form {export.date_format!r}" if export.date_format else "as ISO 8601 writes it"
-            raise sheet.error(f"{cell!r} is no date {form}", row, source) from None
+            form = f"of the form {export.date_format!r}" if export.date_format else "in ISO 8601 format"
+            raise sheet.error(f"{cell!r} is not a date {form}", row, source) from None
     return np.array([(moment - moments[0]).total_seconds() for moment in moments])
 
 
 def _moment(cell: str, form: str | None, zone: ZoneInfo | None) -> datetime:
-    """The date in a cell; ValueError where there is none. `form`: as for strptime, None for ISO 8601; `zone`: of dates
-    that name none; without one they are taken as those of UTC, so that no change of the clocks is seen."""
+    """Parse the date in a cell; raises ValueError if there is none. `form`: as for strptime, None for ISO 8601. `zone`:
+    time zone of dates that name none; if None, they are taken as UTC, without daylight-saving changes."""
     text = cell.strip()
     moment = datetime.fromisoformat(text) if form is None else datetime.strptime(text, form)
     return (moment if moment.tzinfo else moment.replace(tzinfo=zone or UTC)).astimezone(UTC)
 
 
 def _zone(name: str) -> ZoneInfo:
-    """The zone of this name; ValueError where there is none."""
+    """Return the time zone of this name; raises ValueError if it is unknown."""
     try:
         return ZoneInfo(name)
     except (ZoneInfoNotFoundError, OSError) as error:
@@ -208,13 +209,13 @@ def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) ->
 
 
 def unit_in_file(sheet: Sheet, place: int) -> str | None:
-    """The unit that a file itself gives for a column: in a row of units, or in brackets behind its name."""
+    """Return the unit that a file itself gives for a column: in a row of units, or in brackets after its name."""
     name = sheet.names[place][-1] if sheet.names[place] else ""
     return unit_in(sheet.units[place]) or (unit_in(name) if _BRACKETS.search(name) else None)
 
 
 def unit_in(text: str) -> str | None:
-    """The unit that a text ends with in brackets, or is; None where there is none."""
+    """Return the unit that a text ends with in brackets, or consists of; None if there is none."""
     found = _BRACKETS.search(text)
     word = (found[1] if found else text).strip()
     word = _SPELT.get(word.lower(), word)
@@ -227,7 +228,7 @@ def _sizes(name: str) -> Mapping[str, float]:
 
 
 def units_for(name: str) -> list[str]:
-    """The units in which a column of the data set may be declared."""
+    """Return the units in which a column of the data set may be declared."""
     return [*_sizes(name), *((FRAME, DATE) if name == "time_s" else ())]
 
 
@@ -235,7 +236,7 @@ def units_for(name: str) -> list[str]:
 
 
 def parse_export(fields: Fields, name: str) -> Export:
-    """The declaration in a table; DatasetError, with its line, for what is unknown, missing or out of range."""
+    """Parse a declaration. Raises DatasetError, with the line, for anything unknown, missing or out of range."""
     if "preset" in fields:
         preset = presets()[fields.choice("preset", tuple(presets()))]
         fields = fields.completed({key: value for key, value in preset.items() if key in _KEYS})
@@ -299,12 +300,12 @@ def _check_columns(fields: Fields, export: Export) -> None:
     for name in export.columns:
         if not is_command(name) and name not in export.units and name not in export.factor:
             allowed = " | ".join(units_for(name))
-            raise fields.error("units", f"{name} has no unit: declare the one in the file ({allowed}), or a factor")
+            raise fields.error("units", f"{name} has no unit: declare its unit in the file ({allowed}), or a factor")
 
 
 def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any) -> None:
     if key == "columns" and not (isinstance(value, str) and value.strip()):
-        raise fields.error(key, f"{name} must be the export's own name of the column, a string")
+        raise fields.error(key, f"{name} must be a string, the column's name in the export")
     if key in ("factor", "offset"):
         fields.inner(key, {name: value}).number(name)
     if key == "factor" and not value:
@@ -315,25 +316,25 @@ def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any
         if value not in units_for(name):
             raise fields.error(key, f"{name} is {value!r}; it must be one of {', '.join(units_for(name))}")
         if value == FRAME and export.rate_hz is None:
-            raise fields.error("rate_hz", "must be given, in frames a second, where time_s counts frames")
+            raise fields.error("rate_hz", "must be given, in frames a second, if time_s counts frames")
 
 
 @cache
 def presets() -> dict[str, dict[str, Any]]:
-    """The declarations that ship with bifa, by name: one file each."""
+    """Return the declarations that ship with bifa, by name; each is a file."""
     folder = files("bifa.data") / "presets"
     found = {Path(file.name).stem: tomllib.loads(file.read_text("utf-8")) for file in folder.iterdir()}
     return dict(sorted(found.items()))
 
 
 def parse_exports(fields: Fields, source: Any) -> dict[str, Export]:
-    """The tables [instrument.machine] and [instrument.camera], by these names."""
+    """Parse the tables [instrument.machine] and [instrument.camera]; the result is keyed by "machine" and "camera"."""
     declared = {}
     for role in (MACHINE, CAMERA):
         if role in fields:
             declared[role] = parse_export(Fields(fields.take(role), source, table=f"instrument.{role}"), role)
     for name in fields.remaining():
         raise fields.error(
-            name, f"must be {MACHINE} (static loadings, pulls) or {CAMERA} (steps, walks): whose files they are"
+            name, f"must be {MACHINE} (static loadings, pulls) or {CAMERA} (steps, walks), by whose files they are"
         )
     return declared

@@ -1,4 +1,4 @@
-"""Typed, exhaustive reading of a TOML table: every key is asked for, and what is left over is refused."""
+"""Typed, exhaustive reading of a TOML table: keys are read one by one, and unknown keys are refused."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .layout import TABLE_FILE
 
 
 class Source:
-    """The text of dataset.toml, or of another `file`, kept to name lines. Lines are given only where they are
-    certain."""
+    """The text of dataset.toml, or of another `file`, kept to find line numbers for error messages. A line is given
+    only if it is certain."""
 
     def __init__(self, text: str, trials: int, file: str = TABLE_FILE):
         self.file = file
@@ -24,9 +24,9 @@ class Source:
         self._trials = list(bounds) if len(starts) == trials else []
 
     def line(self, trial: int | None, path: tuple[str, ...]) -> int | None:
-        """Line of the key `path` in trial number `trial` (from 1) or at the top level.
+        """Return the line of the key `path` in trial number `trial` (from 1) or, if None, at the top level.
 
-        Where the key itself has no line of its own, that of the innermost table around it.
+        If the key has no line of its own, the line of the innermost enclosing table is returned.
         """
         section: tuple[str, ...] = ()
         if trial is None:
@@ -56,7 +56,7 @@ def _keys(dotted: str) -> tuple[str, ...]:
 
 
 class Fields:
-    """One table, read key by key; `finish` refuses the keys that nobody asked for."""
+    """One table, read key by key; `finish` refuses the keys that were not read."""
 
     def __init__(self, values: Any, source: Source, trial: int | None = None, table: str | None = None):
         self._source, self._trial, self._table = source, trial, table
@@ -66,7 +66,7 @@ class Fields:
         self._asked: list[str] = []
 
     def error(self, key: str | None, problem: str) -> DatasetError:
-        """The error for `key` of this table, its line found."""
+        """Return the error for `key` of this table, with its line."""
         path = tuple(part for part in (*(self._table or "").split("."), key) if part)
         where = [".".join(path)] if path else []
         if self._trial is not None:
@@ -78,14 +78,14 @@ class Fields:
         return key in self._values
 
     def take(self, key: str) -> Any:
-        """The value of a required key, of any type."""
+        """Take the value of a required key, of any type."""
         self._asked.append(key)
         if key not in self._values:
             raise self.error(key, "the key is missing")
         return self._values.pop(key)
 
     def text(self, key: str) -> str:
-        """A string that is not empty and has no control characters."""
+        """Take a string that is not empty and has no control characters."""
         value = self.take(key)
         if not isinstance(value, str):
             raise self.error(key, f"must be a string, not {_kind(value)}")
@@ -94,14 +94,14 @@ class Fields:
         return value
 
     def choice(self, key: str, allowed: tuple[str, ...]) -> str:
-        """One of the strings `allowed`."""
+        """Take one of the strings `allowed`."""
         value = self.text(key)
         if value not in allowed:
             raise self.error(key, f"{value!r} is unknown; it must be one of {', '.join(allowed)}")
         return value
 
     def number(self, key: str, low: float = -math.inf, high: float = math.inf) -> float:
-        """A finite number in [low, high]."""
+        """Take a finite number in [low, high]."""
         value = self.take(key)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f"must be a number, not {_kind(value)}")
@@ -116,14 +116,14 @@ class Fields:
         return number
 
     def positive(self, key: str) -> float:
-        """A finite number above zero."""
+        """Take a finite number above zero."""
         value = self.number(key)
         if value <= 0:
             raise self.error(key, f"{value:g} must be above zero")
         return value
 
     def whole(self, key: str, low: int, high: int = 2**31 - 1) -> int:
-        """A whole number in [low, high]."""
+        """Take a whole number in [low, high]."""
         value = self.take(key)
         if isinstance(value, bool) or not isinstance(value, int):
             raise self.error(key, f"must be a whole number, not {_kind(value)}")
@@ -132,18 +132,18 @@ class Fields:
         return value
 
     def table(self, key: str) -> dict[str, Any]:
-        """A nested table, unread."""
+        """Take a nested table, unparsed."""
         value = self.take(key)
         if not isinstance(value, dict):
             raise self.error(key, f"must be a table, not {_kind(value)}")
         return value
 
     def inner(self, key: str, values: Any) -> Fields:
-        """The table `values` under `key`, to be read likewise."""
+        """Return `Fields` for the table `values` under `key`."""
         return Fields(values, self._source, self._trial, key)
 
     def completed(self, defaults: Mapping[str, Any]) -> Fields:
-        """What is left of this table, with `defaults` for what it does not say; a table in it is completed alike."""
+        """Return the keys not yet read, with `defaults` for missing ones; nested tables are completed likewise."""
         mixed = {
             key: {**defaults[key], **value}
             if isinstance(value, dict) and isinstance(defaults.get(key), dict)
@@ -153,11 +153,11 @@ class Fields:
         return Fields({**defaults, **mixed}, self._source, self._trial, self._table)
 
     def remaining(self) -> list[str]:
-        """Keys that have not been asked for yet."""
+        """Return the keys that have not been read yet."""
         return list(self._values)
 
     def finish(self, also: tuple[str, ...] = ()) -> None:
-        """Refuse what is left; `also` names the optional keys that were absent, for the message."""
+        """Refuse the keys that were not read; `also` names absent optional keys for the message."""
         for key in self._values:
             allowed = ", ".join(dict.fromkeys((*self._asked, *also)))
             raise self.error(key, f"unknown key; those allowed here are {allowed}")

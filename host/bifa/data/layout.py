@@ -1,17 +1,17 @@
-"""What the format allows: experiments, their columns, their keys and ranges (docs/data-format.md)."""
+"""Definition of the format: experiments with their columns, keys and ranges (docs/data-format.md)."""
 
 from dataclasses import dataclass
 
 FORMAT = 1
 TABLE_FILE = "dataset.toml"
-RAW = "raw"  # folder in a data set: the instruments' files as they came
+RAW = "raw"  # folder in a data set for unchanged copies of the instruments' files
 ACTUATORS = ("large", "small")
 DIRECTIONS = ("forward", "backward")
 
 INCLINATION_RANGE_DEG = (-90.0, 90.0)
 PRESSURE_RANGE_PSI = (-15.0, 15.0)  # the sensor's span, Honeywell ABP...015PD: +-15 psi
 
-# Parameters of a trial's gait, and those that may stand beside them.
+# Parameters of a trial's gait, required and optional.
 GAIT = ("period_s", "psi12_deg", "psi13_deg", "duty_body", "duty_head", "duty_tail")
 GAIT_OPTIONAL = ("coupling_per_s",)
 
@@ -20,7 +20,7 @@ GAIT_OPTIONAL = ("coupling_per_s",)
 class Layout:
     """Columns and keys of one experiment.
 
-    `required` and `optional` are keys of a `[[trial]]` beside those that every trial has.
+    `required` and `optional` are keys of a `[[trial]]` in addition to those that every trial has.
     """
 
     columns: tuple[str, ...]
@@ -31,7 +31,7 @@ class Layout:
 
     @property
     def all_columns(self) -> tuple[str, ...]:
-        """Every column that a file of this experiment may have."""
+        """All columns that a file of this experiment may have."""
         return self.columns + self.optional_columns
 
 
@@ -73,7 +73,7 @@ EXPERIMENTS: dict[str, Layout] = {
 # Settings of a single trial that are not fields of their own; they live in Trial.extra.
 SETTINGS = ("load_cell_N_m", "inclination_deg", "direction")
 
-# Notes that fits make use of, and between what they must lie. A clock that is off by more is no clock.
+# Notes that fits use, with their allowed ranges. A clock outside its range is considered broken.
 NOTED = {
     "set_point_psi": PRESSURE_RANGE_PSI,
     "extended_psi": PRESSURE_RANGE_PSI,

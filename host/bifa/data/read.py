@@ -1,4 +1,4 @@
-"""Reading a data set from its folder: strict, and nothing guessed."""
+"""Strict reading of a data set from its folder; nothing is guessed."""
 
 import itertools
 import os
@@ -35,15 +35,15 @@ from .layout import (
 from .sheet import Sheet
 
 _CHAMBERS = tuple(c.removeprefix("command_") for c in EXPERIMENTS["locomotion"].columns if is_command(c))
-LARGEST = 1e12  # in any unit: no measurement, and small enough to be squared and averaged
+LARGEST = 1e12  # in any unit: beyond any measurement, yet small enough to be squared and averaged
 _SHORTEST_STEP_S = 1e-6
-_CLOCK_S = 0.1  # by which a time may be outside its trial: of the order of a command's age
+_CLOCK_S = 0.1  # tolerance for times outside their trial: of the order of a command's age
 
 
 def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     """Read the data set in folder `path` (format: docs/data-format.md).
 
-    Raises DatasetError, with file, line and column or key, for anything that breaks the format.
+    Raises DatasetError, with file, line and column or key, for anything that violates the format.
     """
     folder = Path(path)
     if not folder.is_dir():
@@ -73,8 +73,7 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
 
 
 def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> dict[str, np.ndarray]:
-    """The columns of a file in the data set's own form, or in the form declared for the instrument of its
-    experiment."""
+    """Columns of a file in the data set's own form, or in the form declared for the instrument of its experiment."""
     layout = EXPERIMENTS[head["experiment"]]
     export = exports.get(ROLES[head["experiment"]], OWN_NAMES)
     sheet = Sheet(path, export.form, head["file"])
@@ -86,12 +85,12 @@ def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> di
 
 
 def _check_header(sheet: Sheet, layout: Layout) -> None:
-    """Raise DatasetError for what is no header of a file in the data set's own form: it has the columns of the
-    experiment, each once, and no other."""
+    """Raise DatasetError unless the header of a file in the data set's own form has all columns of the experiment, each
+    once, and no others."""
     names, expected = sheet.labels(), f"the columns of this experiment are {', '.join(layout.all_columns)}"
     for place, name in enumerate(names):
         if name.startswith("#"):
-            raise sheet.error('begins with #, as numpy.savetxt writes it; have it written with comments=""', -1, name)
+            raise sheet.error('begins with #, as numpy.savetxt writes it; write it with comments=""', -1, name)
         if name not in layout.all_columns:
             raise sheet.error(f"unknown column {name!r}; {expected}", -1, name or "(no name)")
         if name in names[:place]:
@@ -102,11 +101,11 @@ def _check_header(sheet: Sheet, layout: Layout) -> None:
 
 
 def _check_values(columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarray, named: Mapping[str, str]) -> None:
-    """Raise DatasetError for what cannot have been measured. Columns have the shape of `rows`, those of the sheet that
-    they are from; `named`: what the file calls a column, where that is another name."""
+    """Raise DatasetError for values that cannot have been measured. Columns have the shape of `rows`, the sheet's rows
+    that they come from; `named`: a column's name in the file, if different."""
 
     def refuse(name: str, wrong: np.ndarray, problem: str) -> None:
-        """`problem` is filled in with the first `value` that is wrong, the one `before`, and the `step` between."""
+        """`problem` is formatted with the first wrong `value`, the one `before` it, and the `step` between them."""
         if wrong.any():
             row = int(np.argmax(wrong))
             value, before = (float(columns[name][at]) for at in (row, row - 1))
@@ -135,7 +134,7 @@ def _read_toml(folder: Path) -> tuple[Fields, Source]:
     except OSError as error:
         raise DatasetError(f"cannot be read ({error.strerror})", file=TABLE_FILE) from None
     try:
-        text = raw.decode("utf-8").removeprefix("\ufeff")  # a mark that some editors begin a file with
+        text = raw.decode("utf-8").removeprefix("\ufeff")  # the byte order mark that some editors write
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise DatasetError(f"byte 0x{raw[error.start]:02x} is not UTF-8", file=TABLE_FILE, line=line) from None
@@ -151,16 +150,16 @@ def _read_toml(folder: Path) -> tuple[Fields, Source]:
 def _no_table(folder: Path) -> str:
     inside = sorted(path.parent.name for path in folder.glob(f"*/{TABLE_FILE}"))
     if inside:
-        return f"{folder} is not a data set, but contains {', '.join(inside)}: name {folder / inside[0]}"
+        return f"{folder} is not a data set, but contains {', '.join(inside)}: use {folder / inside[0]}"
     return (
         f"{folder} has no {TABLE_FILE}: a data set is a folder with this file, which lists the trials, and a CSV file "
         "for each. Write it beside your files (docs/data-format.md shows how), or let `bifa experiment` record one; "
-        "with --instrument it takes the record of your own instrument"
+        "with --instrument it imports the record of your own instrument"
     )
 
 
 def _trial_head(fields: Fields) -> dict[str, Any]:
-    """The keyword arguments of Trial, without the columns."""
+    """Keyword arguments of Trial, except the columns."""
     head: dict[str, Any] = {"file": fields.text("file")}
     head["experiment"] = fields.choice("experiment", tuple(EXPERIMENTS))
     layout = EXPERIMENTS[head["experiment"]]
@@ -183,7 +182,7 @@ def _trial_head(fields: Fields) -> dict[str, Any]:
 
 
 def _check_switches(trial: Trial, fields: Fields) -> None:
-    """When the valves switched, if that is noted: a list for a step, a table of them for a walk."""
+    """Check `switch_time_s`, if noted: a list for a step, a table of lists for a walk."""
     noted = trial.extra.get("switch_time_s")
     if noted is None or trial.experiment not in ("step_response", "locomotion"):
         return
@@ -198,7 +197,7 @@ def _check_switches(trial: Trial, fields: Fields) -> None:
         if not isinstance(times, list) or any(type(t) not in (int, float) for t in times):
             raise extra.error("switch_time_s", f"{trial.file}: must be a list of numbers")
         if not all(low <= t <= high for t in times) or any(b <= a for a, b in itertools.pairwise(times)):
-            raise extra.error("switch_time_s", f"{trial.file}: must be rising times within the trial, in s")
+            raise extra.error("switch_time_s", f"{trial.file}: must be increasing times within the trial, in s")
 
 
 def _setting(fields: Fields, key: str) -> Any:
@@ -223,7 +222,7 @@ def _gait(fields: Fields) -> dict[str, float]:
 
 
 def _inside(folder: Path, head: dict[str, Any], fields: Fields, exports: Mapping[str, Export]) -> Path:
-    """The path of a trial's file, certain to be a regular file within the folder."""
+    """Path of a trial's file, verified to be a regular file within the folder."""
     file = head["file"]
     if PurePosixPath(file).is_absolute() or PureWindowsPath(file).anchor or ".." in Path(file).parts:
         raise fields.error("file", f"{file!r} is outside the data set; name a file within the folder")
@@ -236,7 +235,7 @@ def _inside(folder: Path, head: dict[str, Any], fields: Fields, exports: Mapping
         if not resolved.is_file():
             what = "is not a regular file" if resolved.exists() else "does not exist"
             raise fields.error("file", f"the file {file!r} {what}")
-    except (OSError, RuntimeError) as error:  # too long a name, a loop of links
+    except (OSError, RuntimeError) as error:  # the name is too long, or links form a loop
         raise fields.error("file", f"{file!r} cannot be opened: {error}") from None
     return resolved
 

@@ -1,7 +1,7 @@
-"""Tables as other programs write them: their cells, the names of their columns, and the number in each cell.
+"""Tables as other programs write them: cells, column names and numbers.
 
-pandas reads; what it cannot read as plain numbers is parsed cell by cell, so that the first fault is named by line,
-column and cell. Nothing is guessed: `SheetForm` says how the file is written.
+pandas reads the file; columns that it cannot read as plain numbers are parsed cell by cell, so that the first fault is
+reported with line, column and cell. Nothing is guessed: `SheetForm` says how the file is written.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _MOST_NAMED = 8
 
 @dataclass(frozen=True)
 class SheetForm:
-    """How a file is written. The names of columns stand in `header_rows` rows, from `skip_rows` on, or, where `header`
-    is given, in those that end with the line that begins with this text; below them `units_rows` rows that are no data.
-    `encoding` is Python's name of it. `sheet` is of a workbook."""
+    """How a file is written. The column names are in `header_rows` rows after the first `skip_rows` or, if `header` is
+    given, in the rows up to the line whose first cell is this text; below them follow `units_rows` rows that are not
+    data. `encoding` is Python's name for it; `sheet` names the sheet of a workbook."""
 
     format: str = "csv"
     separator: str = ","
@@ -49,8 +49,8 @@ OWN = SheetForm()
 
 
 class Sheet:
-    """A table as it was written. `names`: the parts of each column's name, one a header row; `units`: what the rows of
-    units say of it; `first`: the line of the first row of numbers. Raises DatasetError for what is no table."""
+    """A table as written in the file. `names`: the parts of each column's name, one per header row; `units`: each
+    column's text in the rows of units; `first`: line of the first data row. Raises DatasetError if it is no table."""
 
     def __init__(self, path: Path, form: SheetForm = OWN, file: str | None = None) -> None:
         self._path, self._form, self.file = path, form, str(path) if file is None else file
@@ -75,7 +75,7 @@ class Sheet:
         if self._encoding.startswith(("utf-16", "utf-32")):
             raw, self._encoding = self._decoded(raw).encode(), "utf-8"
         elif self._encoding == "utf-8":
-            raw = raw.removeprefix(codecs.BOM_UTF8)  # a spreadsheet begins its files with a mark
+            raw = raw.removeprefix(codecs.BOM_UTF8)  # spreadsheets write one
         if b"\r" in raw[:_HEAD] and b"\n" not in raw[:_HEAD]:
             raw = raw.replace(b"\r", b"\n")
         lines = raw[:_HEAD].split(b"\n")
@@ -110,7 +110,7 @@ class Sheet:
             cells = self._cells(line) if place >= form.skip_rows and form.header in line else []
             if cells and cells[0].strip() == form.header and place + 1 >= form.header_rows:
                 return place - form.header_rows + 1
-        raise self._error(f"no line begins with {form.header!r}, where the names of the columns should stand")
+        raise self._error(f"no line begins with {form.header!r}, the declared header of the column names")
 
     def _cells(self, line: str, number: int | None = None) -> list[str]:
         if self._form.separator == " ":
@@ -129,7 +129,7 @@ class Sheet:
 
     @cached_property
     def _frame(self) -> Any:
-        """Columns by their place; numbers where pandas could read all of a column as such."""
+        """Columns by position; numeric if pandas could read the whole column as numbers."""
         frame = self._rows if self._form.format == "xlsx" else self._parsed()
         width = len(self.names)
         if frame.shape[1] > width:
@@ -141,8 +141,8 @@ class Sheet:
         return frame.iloc[:last]
 
     def _parsed(self) -> Any:
-        """The table as pandas reads it; where pandas finds none, or other lines than the file has (a quote left
-        open), line by line as it was written."""
+        """The table as pandas reads it; if pandas fails or finds another number of lines than the file has (an unclosed
+        quote), the cells line by line as written."""
         import pandas
 
         try:
@@ -173,13 +173,13 @@ class Sheet:
         return lines if lines[-1].strip(b"\r") else lines[:-1]
 
     def _written(self, row: int) -> list[str]:
-        """The cells of a line, parted when they are asked for: of a file of many megabytes few ever are."""
+        """Cells of a line, split on demand: in a file of many megabytes few are ever needed."""
         return self._cells(self._decoded(self._lines[row]), self.line(row))
 
     # -- names -----------------------------------------------------------------------------------------------------
 
     def _refuse_other_separator(self) -> None:
-        """One name that holds another program's separator is no name."""
+        """Refuse a single column name that contains another separator: the declared separator is wrong."""
         if self._form.separator != " " and self._form.format == "csv" and len(self.names) == 1 and self.names[0]:
             for mark in set(_NAMES_OF) - {" ", self._form.separator}:
                 if mark in self.names[0][0]:
@@ -190,12 +190,12 @@ class Sheet:
                     )
 
     def labels(self) -> list[str]:
-        """What each column is called, the parts of its name together."""
+        """Return the full name of each column, its parts joined by " / "."""
         return [" / ".join(parts) for parts in self.names]
 
     def find(self, name: str) -> int:
-        """The place of the column of this name: of some of its parts, in order, and "X [2]" the second of that name.
-        DatasetError where there is none, or several."""
+        """Return the position of the column called `name`, which may be any of its parts in order; "X [2]" is the
+        second column called X. Raises DatasetError if there is none, or several."""
         bare, _, which = name.removesuffix("]").rpartition(" [")
         chosen = int(which) if name.endswith("]") and bare and which.isdecimal() else None
         places = [place for place, parts in enumerate(self.names) if _is_called(parts, name)]
@@ -207,7 +207,7 @@ class Sheet:
         if len(places) > 1:
             found = listed(self.labels()[place] for place in places)
             raise self._error(
-                f"has the column {name} more than once ({found}): keep the right one, or write more of its name, or "
+                f"has the column {name} more than once ({found}): keep the right one, or give more of its name, or "
                 f'"{name} [1]" for the first'
             )
         return places[0]
@@ -225,11 +225,12 @@ class Sheet:
         return len(self._frame)
 
     def line(self, row: int) -> int:
-        """The line of the file in which a row stands."""
+        """Return the line of the file that a data row is on."""
         return self.first + int(row)
 
     def numbers(self, place: int, name: str) -> np.ndarray:
-        """A column, shape (rows,), NaN where a cell is empty. DatasetError where one is no number."""
+        """Return a column as numbers, shape (rows,), NaN for empty cells. Raises DatasetError if a cell is not a
+        number."""
         if place >= self._frame.shape[1]:
             return np.full(len(self), np.nan)
         column = self._frame.iloc[:, place]
@@ -238,7 +239,7 @@ class Sheet:
         return np.array([self._number(cell, row, name) for row, cell in enumerate(self.cells(place))], float)
 
     def cells(self, place: int) -> list[str]:
-        """A column as it was written."""
+        """Return a column as the text in the file."""
         if place >= self._frame.shape[1]:
             return [""] * len(self)
         if self._form.format == "xlsx":
@@ -257,7 +258,7 @@ class Sheet:
         return np.nan if found is None else found
 
     def error(self, problem: str, row: int | None = None, column: str | None = None) -> DatasetError:
-        """The error at a row of the data."""
+        """Return an error located at a row of the data."""
         return self._error(problem, None if row is None else self.line(row), column)
 
     def _error(self, problem: str, line: int | None = None, column: str | None = None) -> DatasetError:
@@ -268,14 +269,14 @@ class Sheet:
         cells = self._written(row) if self._form.format == "csv" else []
         raise self.error(
             f"{max(len(cells), width + 1)} fields, but {width} columns; are there commas in the numbers, or lines "
-            "above the names of the columns? Save it with decimal points and without them, or declare how it is "
+            "above the column names? Save it with decimal points and without such lines, or declare how it is "
             "written (bifa instrument)",
             row,
         )
 
 
 def _exact() -> dict[str, str]:
-    """Options that make pandas read a decimal as the nearest double; later versions do, and warn if asked to."""
+    """Options that make pandas read a decimal as the nearest double; newer versions always do, and warn if told to."""
     import pandas
 
     old = tuple(int(part) for part in pandas.__version__.split(".")[:2]) < (3, 1)
@@ -283,7 +284,8 @@ def _exact() -> dict[str, str]:
 
 
 def workbook(path: Path, sheet: str | None, file: str) -> tuple[Any, list[list[str]]]:
-    """A sheet of a workbook, the first without a name: as pandas has it, and its cells as text. Raises DatasetError."""
+    """Read a sheet of a workbook (the first if `sheet` is None): the DataFrame of pandas, and the cells as text.
+    Raises DatasetError."""
     import pandas
 
     try:
@@ -294,15 +296,15 @@ def workbook(path: Path, sheet: str | None, file: str) -> tuple[Any, list[list[s
 
 
 def listed(names: Iterable[str]) -> str:
-    """The first names, and how many more there are."""
+    """Return the first names, and how many more there are."""
     names = list(names)
     more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
     return ", ".join(names[:_MOST_NAMED]) + more
 
 
 def _parts(rows: Sequence[Sequence[str]], place: int) -> tuple[str, ...]:
-    """The parts of a column's name, from top to bottom. Above the last row a name that spans several columns (a
-    marker's, over its X, Y and Z) stands in the first of them."""
+    """Parts of a column's name, from top to bottom. Above the last row, a name that spans several columns (a marker's,
+    over its X, Y and Z) is written in the first of them."""
     found = [_cell(row, place) or _spanning(row, place) for row in rows[:-1]] + [_cell(row, place) for row in rows[-1:]]
     return tuple(part for part in found if part)
 
@@ -312,13 +314,13 @@ def _cell(row: Sequence[str], place: int) -> str:
 
 
 def _spanning(row: Sequence[str], place: int) -> str:
-    """The name left of an empty cell, in a row that leaves out the first columns."""
+    """The nearest name to the left of an empty cell, in a row whose first column is empty."""
     before = [cell.strip() for cell in row[:place] if cell.strip()]
     return before[-1] if before and not _cell(row, 0) else ""
 
 
 def _is_called(parts: Sequence[str], name: str) -> bool:
-    """Whether `name` is the parts, or some of them in order."""
+    """Whether `name` consists of `parts`, or of some of them in order."""
     if name == " / ".join(parts):
         return True
     rest = iter(parts)

@@ -1,4 +1,4 @@
-"""Write a data set as a whole or trial by trial; never over another one, and never half of one."""
+"""Write a data set as a whole or trial by trial, without ever overwriting one or leaving half of one."""
 
 import os
 import re
@@ -19,16 +19,16 @@ from .layout import FORMAT, SETTINGS, TABLE_FILE
 from .read import read_dataset
 
 PARTIAL_SUFFIX = ".partial"
-_PROBE = ".probe."  # where a trial is written and read again before it counts
-_STRAY = re.compile(r"\..+\.[0-9a-f]{8}(\.[^.]+)?")  # what a crash leaves of it, and of files that were being written
+_PROBE = ".probe."  # prefix of the folder where a trial is written and read back before it counts
+_STRAY = re.compile(r"\..+\.[0-9a-f]{8}(\.[^.]+)?")  # leftovers of a crash: probes, and files being written
 
 
 def write_dataset(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
     """Write `dataset` as a new folder, complete or not at all; returns the folder.
 
-    Values are written with the digits that read back to the same doubles. What was written is read again by
-    the strict reader before the folder gets its name, so a file that would be refused is never left behind.
-    Raises DatasetError where the folder exists or the data break the format.
+    Values are written with enough digits to read back to the same doubles. The strict reader reads the files back
+    before the folder gets its name, so a file that would be refused is never left behind.
+    Raises DatasetError if the folder exists or the data violate the format.
     """
     target = Path(folder)
     refuse_existing(target)
@@ -47,15 +47,15 @@ def write_dataset(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
 
 
 def partial_of(folder: Path) -> Path:
-    """Where the data set `folder` grows until it is finished."""
+    """Return the folder in which the data set `folder` is built up until it is finished."""
     return named(folder).with_name(named(folder).name + PARTIAL_SUFFIX)
 
 
 class DatasetWriter:
-    """A data set that grows trial by trial in `<folder>.partial`, and takes its name when it is finished.
+    """A data set that grows trial by trial in `<folder>.partial` and gets its final name when it is finished.
 
-    After each `add` the partial folder is a complete data set on disk. A session that was interrupted goes
-    on with `resume=True`: `trials` then holds what was recorded before. Not for two writers at once (bifa.lock).
+    After each `add` the partial folder is a complete data set on disk. An interrupted session is continued with
+    `resume=True`; `trials` then holds what was recorded before. Not for two writers at once (see bifa.lock).
     """
 
     def __init__(
@@ -92,12 +92,12 @@ class DatasetWriter:
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """The trials that are safely on disk."""
+        """The trials recorded so far, all of them on disk."""
         return self._dataset.trials
 
     @property
     def provenance(self) -> Mapping[str, Any]:
-        """What was noted by the session that began the data set."""
+        """Provenance noted by the session that began the data set."""
         return self._dataset.provenance
 
     def has(self, trial: Trial) -> bool:
@@ -106,13 +106,13 @@ class DatasetWriter:
         return any((old.condition, old.repeat) == wanted for old in self.trials)
 
     def add(self, trial: Trial) -> None:
-        """Record one more trial. On an error nothing of it stays."""
+        """Add a trial. On an error nothing of it remains."""
         if self.has(trial) or any(old.file == trial.file for old in self.trials):
             raise DatasetError(f"{trial.file}: this trial is already recorded in {self.partial}")
         self._dataset = add_trial(self._dataset, trial)
 
     def finish(self) -> Dataset:
-        """Give the data set its name; returns it as read back from disk."""
+        """Give the data set its final name; returns it as read back from disk."""
         refuse_existing(self.folder)
         _remove_strays(self.partial)
         read_dataset(self.partial)
@@ -125,16 +125,16 @@ def _remove_strays(folder: Path) -> None:
         if stray.is_dir() and not stray.is_symlink():
             shutil.rmtree(stray)
         else:
-            stray.unlink(missing_ok=True)  # gone already with the folder it was in
+            stray.unlink(missing_ok=True)  # may have been removed with its folder
 
 
 def add_trial(dataset: Dataset, trial: Trial) -> Dataset:
-    """Add one trial to a data set on disk; returns the larger one. On an error nothing of it is listed. Raises
-    DatasetError where it breaks the format."""
+    """Add one trial to a data set on disk; returns the extended data set. On an error the trial is not listed. Raises
+    DatasetError if it violates the format."""
     if dataset.exports:
         raise DatasetError(
-            f"{dataset.path} declares how instruments write its files ([instrument]), and trials are added in the data "
-            "set's own form: add to a copy of it, write_dataset(folder, read_dataset(...))"
+            f"{dataset.path} declares how instruments write its files ([instrument]), but trials are added in the data "
+            "set's own form: add to a copy made by write_dataset(folder, read_dataset(...))"
         )
     folder, grown = dataset.folder, replace(dataset, trials=(*dataset.trials, trial))
     probe = folder / f"{_PROBE}{secrets.token_hex(4)}"
@@ -150,13 +150,13 @@ def add_trial(dataset: Dataset, trial: Trial) -> Dataset:
 
 
 def refuse_existing(folder: Path) -> None:
-    """Raise DatasetError where `folder` exists: a data set is never overwritten."""
+    """Raise DatasetError if `folder` exists: a data set is never overwritten."""
     if folder.exists() or folder.is_symlink():
         raise DatasetError(f"{folder} exists; a data set is never overwritten: choose another name")
 
 
 def _publish(scratch: Path, target: Path) -> None:
-    """Rename, which is atomic; a folder that appeared meanwhile makes it fail unless it is empty."""
+    """Rename `scratch` to `target` atomically; fails if a non-empty folder appeared there meanwhile."""
     refuse_existing(target)
     try:
         os.rename(scratch, target)
@@ -178,7 +178,7 @@ def _write_csv(folder: Path, trial: Trial) -> None:
 
 
 def _texts(values: Any) -> list[str]:
-    """Shortest decimal text that reads back to the same double; whole numbers without a fraction."""
+    """Shortest decimal texts that read back to the same doubles; whole numbers without a fraction."""
     return [text.removesuffix(".0") for text in map(repr, map(float, values))]
 
 
@@ -204,7 +204,7 @@ def _head(trial: Trial) -> dict[str, Any]:
 
 
 def _write_durably(path: Path, text: str) -> None:
-    """Whole or not at all, and DatasetError where it cannot be written."""
+    """Write a file completely or not at all; raises DatasetError if it cannot be written."""
     try:
         write_text(path, text)
     except TargetError as error:

@@ -1,4 +1,4 @@
-"""The library: what a real robot may do that the paper's model does not. One effect a file; adding one adds a file."""
+"""The library of effects: mechanisms of a real robot that the paper's model lacks. Each effect is one file here."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ _NOT_AN_EFFECT = "effect"
 
 @cache
 def modules() -> Mapping[str, ModuleType]:
-    """Each effect's module by the effect's name, in alphabetical order."""
+    """The module of each effect by the effect's name, in alphabetical order."""
     names = sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name != _NOT_AN_EFFECT)
     return MappingProxyType({name: importlib.import_module(f"{__name__}.{name}") for name in names})
 
 
 @cache
 def library() -> Mapping[str, PhysicalEffect]:
-    """Every effect by name."""
+    """All effects by name."""
     return MappingProxyType({name: module.EFFECT for name, module in modules().items()})
 
 
 def complete(name: str, values: Mapping[str, float]) -> dict[str, float]:
-    """An effect's parameters in full: those left out take their typical value, or the one for omission. EffectError
-    names the range."""
+    """All parameters of an effect. Omitted ones take their `omitted` value if they have one, else their typical value.
+    Raises EffectError for an unknown effect or parameter, or a value out of range."""
     if name not in library():
         raise EffectError(f"{name!r} is not an effect of the library; it has {', '.join(library())}")
     known = {parameter.name: parameter for parameter in library()[name].parameters}

@@ -1,11 +1,11 @@
-"""Backlash: play between the bistable mechanism and the end that moves."""
+"""Backlash: play between the bistable mechanism and the moving end."""
 
 from bifa.effects.effect import EffectParameter, PhysicalEffect
 
 EFFECT = PhysicalEffect(
     name="backlash",
-    summary="the spring follows the moving end only after a play is taken up, and so does a pull at the head",
-    equation="K(y), y follows x as a play of width gap_m; anchor pull: the load train is slack over gap_m",
+    summary="the spring follows the moving end only after play is taken up; in an anchor pull, so does the head",
+    equation="K(y), y follows x with play of width gap_m; anchor pull: the load train is slack over gap_m",
     source="play operator, e.g. M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, ch. 2",
     enters="eq. (1), the argument of K; the load train of the anchor pull",
     experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
@@ -15,12 +15,12 @@ EFFECT = PhysicalEffect(
 
 
 def initial(position_m):
-    """The middle of the play."""
+    """Initial position of the spring: the moving end is in the middle of the play."""
     return position_m
 
 
 def play(gap_m, position_m, state):
-    """Where the spring is when the moving end is at `position_m`."""
+    """Position of the spring when the moving end is at `position_m`."""
     return min(max(state, position_m - 0.5 * gap_m), position_m + 0.5 * gap_m)
 
 

@@ -1,6 +1,6 @@
-"""What every effect's file declares: an `EFFECT`, and functions named after the hooks where it acts.
+"""The declarations in an effect's file, which defines an `EFFECT` and functions named after the hooks where it acts.
 
-The hooks, their arguments and what they return are listed in `bifa.simulate.hooks`.
+`bifa.simulate.hooks` lists the hooks with their arguments, docs/adding-an-effect.md what they return.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ class EffectError(BifaError):
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One number of an effect. `typical` is the size at which the effect is clearly visible on the paper's robot.
+    """One parameter of an effect. `typical`: a value at which the effect is clearly visible on the paper's robot.
 
-    A `size` parameter is 0 when the effect is absent; the others only shape it. An `own` parameter has a value of its
-    own in every trial; a `frequency` is searched in the residual's spectrum. `omitted`: the value where it is left out,
-    if not the typical one (in files older than the parameter). `period`: of a periodic value.
+    A `size` parameter is 0 when the effect is absent; the others only shape it. An `own` parameter has a separate value
+    in every trial. A `frequency` is searched for in the residual's spectrum. `omitted`: the value if the parameter is
+    left out (as in files older than the parameter), unless that is the typical one. `period`: period of a periodic
+    parameter.
     """
 
     name: str
@@ -40,10 +41,10 @@ class EffectParameter:
 class PhysicalEffect:
     """A physical cause that the paper's model lacks.
 
-    `enters`: the equation and the place in it; `experiments`: where it can be seen at all; `states`: numbers remembered
-    for each actuator; `freed_at`: where its form may differ from the formula, by the names in `bifa.problem.sites`;
-    `apart`: parameters that it needs to be above those that they cannot be below; `unlike_cycles`: no cycle of a gait
-    is like the one before.
+    `enters`: the equation and the place in it where the effect acts; `experiments`: those in which it is observable;
+    `states`: number of state variables per actuator; `freed_at`: sites (`bifa.problem.sites`) where its form may differ
+    from the formula; `apart`: base parameters that cannot be below another one and must exceed it for the effect to act
+    (such as mu_s, which cannot be below mu_k); `unlike_cycles`: successive cycles of a gait differ.
     """
 
     name: str
@@ -60,5 +61,5 @@ class PhysicalEffect:
 
     @property
     def sizes(self) -> tuple[EffectParameter, ...]:
-        """The parameters that are 0 when the effect is absent."""
+        """The `size` parameters, which are 0 when the effect is absent."""
         return tuple(parameter for parameter in self.parameters if parameter.size)

@@ -1,4 +1,4 @@
-"""Friction that differs forward and backward, as tape, bristles or a curved support make it."""
+"""Friction direction: friction differs between forward and backward, as with tape, bristles or a curved support."""
 
 from bifa.effects.effect import EffectParameter, PhysicalEffect
 
@@ -15,5 +15,5 @@ EFFECT = PhysicalEffect(
 
 
 def grip(asymmetry, direction):
-    """Factor of both coefficients for a direction of sliding, +1 or -1."""
+    """Factor of both coefficients for sliding in a direction, +1 or -1."""
     return 1.0 + asymmetry * direction

@@ -1,4 +1,4 @@
-"""Regulator ripple: the electropneumatic regulator hunts around its set-point."""
+"""Regulator ripple: the electropneumatic regulator oscillates around its set-point."""
 
 import math
 
@@ -23,7 +23,7 @@ EFFECT = PhysicalEffect(
 
 
 def supply(amplitude_psi, frequency_Hz, phase_rad, supply_psi, now_s):
-    """The regulated supply now; vented (0 psi) it does not hunt."""
+    """Present pressure of the regulated supply; when vented (0 psi) it does not oscillate."""
     if supply_psi <= 0.0:
         return supply_psi
     return supply_psi + amplitude_psi * math.sin(2.0 * math.pi * frequency_Hz * now_s + phase_rad)

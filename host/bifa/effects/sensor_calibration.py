@@ -4,7 +4,7 @@ from bifa.effects.effect import EffectParameter, PhysicalEffect
 
 EFFECT = PhysicalEffect(
     name="sensor_calibration",
-    summary="the pressure reading is off by a gain and an offset; the motion itself is as the model says",
+    summary="the pressure reading is off by a gain and an offset; the motion itself follows the model",
     equation="reading = (1 + gain) p + offset_psi",
     source="total error band of low-cost pressure sensors (data sheets)",
     enters="the pressure channels only",
@@ -18,5 +18,5 @@ EFFECT = PhysicalEffect(
 
 
 def reading(gain, offset_psi, pressure_psi):
-    """What the sensor says."""
+    """Reading of the sensor."""
     return (1.0 + gain) * pressure_psi + offset_psi

@@ -1,4 +1,4 @@
-"""Sensor lag: the pressure reading follows the pressure with a lag of first order."""
+"""Sensor lag: the pressure reading follows the pressure with a first-order lag."""
 
 import math
 
@@ -6,8 +6,8 @@ from bifa.effects.effect import EffectParameter, PhysicalEffect
 
 EFFECT = PhysicalEffect(
     name="sensor_lag",
-    summary="the pressure reading follows late; the motion itself is as the model says",
-    equation="time_s ds/dt = p - s, s is read",
+    summary="the pressure reading lags; the motion itself follows the model",
+    equation="time_s ds/dt = p - s, reading = s",
     source="thin tube to the sensor (paper, section II.C: 1/16 in) and the sensor's own filter",
     enters="the pressure channels only",
     experiments=("step_response", "locomotion"),
@@ -18,12 +18,12 @@ EFFECT = PhysicalEffect(
 
 
 def initial(pressure_psi):
-    """Settled."""
+    """Initial lagged pressure: settled."""
     return pressure_psi
 
 
 def sensor(time_s, before_psi, after_psi, step_s, state):
-    """The lagged pressure after a step over which the true one changed evenly."""
+    """Lagged pressure after a step in which the true pressure changed linearly."""
     decay = math.exp(-step_s / time_s)
     ramp = (after_psi - before_psi) * time_s / step_s
     return after_psi - ramp + (state - before_psi + ramp) * decay

@@ -1,4 +1,4 @@
-"""Stribeck friction: from static to kinetic friction it falls smoothly with speed, not at once."""
+"""Stribeck friction: friction falls smoothly with speed, from static to kinetic, instead of abruptly."""
 
 import math
 
@@ -12,7 +12,7 @@ EFFECT = PhysicalEffect(
     enters="eq. (5), mu_k",
     experiments=("anchor_pull", "locomotion"),
     parameters=(
-        EffectParameter("speed_m_s", "m/s", 0.0, 0.2, 0.01, "speed at which most of it has fallen", size=True),
+        EffectParameter("speed_m_s", "m/s", 0.0, 0.2, 0.01, "speed at which most of the drop has occurred", size=True),
     ),
     freed_at=("friction_speed", "grip_speed"),
     apart=("mu_s",),
@@ -20,6 +20,6 @@ EFFECT = PhysicalEffect(
 
 
 def friction(speed_m_s, coefficient, static_coefficient, sliding_m_s):
-    """Coefficient at a sliding speed (not negative)."""
+    """Coefficient of friction at a sliding speed (not negative)."""
     ratio = sliding_m_s / speed_m_s
     return coefficient + (static_coefficient - coefficient) * math.exp(-ratio * ratio)

@@ -1,4 +1,4 @@
-"""Tether drag: the tubes behind the robot drag more, the further it goes."""
+"""Tether drag: the drag of the tubes behind the robot grows as it advances."""
 
 from bifa.effects.effect import EffectParameter, PhysicalEffect
 
@@ -16,5 +16,5 @@ EFFECT = PhysicalEffect(
 
 
 def drag(drag_N_m, distance_m):
-    """N of additional friction at the tail."""
+    """Additional friction at the tail in N."""
     return drag_N_m * max(distance_m, 0.0)

@@ -1,10 +1,10 @@
-"""Valve asymmetry: opening to positive pressure and going back to vacuum take different times."""
+"""Valve asymmetry: switching to positive pressure and back to vacuum take different times."""
 
 from bifa.effects.effect import EffectParameter, PhysicalEffect
 
 EFFECT = PhysicalEffect(
     name="valve_asymmetry",
-    summary="one edge of the valves is later than the other",
+    summary="the valves' two edges have different delays",
     equation="delay of the edge to positive pressure - delay of the edge to vacuum = difference_s; the earlier is 0",
     source="opening and closing times of solenoid valves differ with their return spring (data sheets)",
     enters="eq. (2), the time of p_d",

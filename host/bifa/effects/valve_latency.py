@@ -4,7 +4,7 @@ from bifa.effects.effect import EffectParameter, PhysicalEffect
 
 EFFECT = PhysicalEffect(
     name="valve_latency",
-    summary="every valve acts a fixed time after its command, opening and closing alike",
+    summary="every valve switches a fixed time after its command, the same for opening and closing",
     equation="p_d(t) = p_command(t - delay_s)",
     source="switching time of solenoid valves, data sheets of 3/2 fast-switching valves",
     enters="eq. (2), the time of p_d",

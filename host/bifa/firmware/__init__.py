@@ -1,5 +1,5 @@
-"""The firmware's image in an installed package: put there by the release (tools/wheels.py), absent in a checkout, which
-builds its own. It is in Intel's HEX format; it says what it is, and so whether this host belongs to it."""
+"""The firmware image in an installed package: put there by the release (tools/wheels.py), absent in a checkout, which
+builds its own. It is in Intel HEX format and states its version and tables, which must match those of this host."""
 
 import hashlib
 import re
@@ -15,17 +15,17 @@ from bifa.link.table import PROTOCOL_VERSION, TABLE_HASH
 
 FOLDER = Path(__file__).parent
 HEX, HEAD = "uno.hex", "uno.toml"
-# What `version` answers, as it lies in flash.
+# The reply to `version`, as stored in flash.
 _SAYS = re.compile(rb"bifa ([\d.]+), protocol (\d+), table ([0-9a-f]{8})")
 
 
 class ImageError(BifaError):
-    """No image, a damaged one, or one of another version."""
+    """The image is missing, damaged, or of another version."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """What identifies an image; `sha256` is that of its file."""
+    """Identity of an image; `sha256` is the hash of its file."""
 
     version: str
     protocol: int
@@ -34,18 +34,18 @@ class Image:
 
 
 def carried_path() -> Path | None:
-    """Where this package's image is, or None in a checkout."""
+    """Return the path of this package's image, or None in a checkout."""
     return FOLDER / HEX if (FOLDER / HEX).is_file() else None
 
 
 def carried_image(folder: Path = FOLDER) -> Path:
-    """The package's image, checked: undamaged, and of the tables that this host speaks."""
+    """Return the path of the package's image after checking that it is undamaged and has this host's tables."""
     try:
         noted = _noted(folder / HEAD)
         found = image_of(folder / HEX)
     except FileNotFoundError as error:
         raise ImageError(
-            "this installation carries no firmware: install a wheel of a release, or work in a clone of the repository"
+            "this installation contains no firmware: install a wheel of a release, or work in a clone of the repository"
         ) from error
     if found != noted:
         raise ImageError(f"{folder / HEX} is damaged: reinstall the wheel of bifa")
@@ -54,7 +54,7 @@ def carried_image(folder: Path = FOLDER) -> Path:
 
 
 def write_image(built: Path, folder: Path = FOLDER) -> Image:
-    """Put the image that was built into the package, if it is of this host's tables."""
+    """Copy a built image into the package if it has this host's tables."""
     image = image_of(built)
     _check_tables(image, built)
     shutil.copyfile(built, folder / HEX)
@@ -63,7 +63,7 @@ def write_image(built: Path, folder: Path = FOLDER) -> Image:
 
 
 def image_of(path: Path) -> Image:
-    """Read what an image says of itself."""
+    """Read the identity that an image states."""
     text = path.read_bytes()
     says = _SAYS.search(_decoded(text.decode("ascii", "replace"), path))
     if says is None:
@@ -75,7 +75,7 @@ def image_of(path: Path) -> Image:
 def _noted(path: Path) -> Image:
     try:
         return Image(**tomllib.loads(path.read_text("utf-8")))
-    except (ValueError, TypeError) as error:  # no text, no TOML, other keys
+    except (ValueError, TypeError) as error:  # not text, not TOML, or other keys
         raise ImageError(f"{path} is damaged: reinstall the wheel of bifa") from error
 
 
@@ -88,7 +88,7 @@ def _check_tables(image: Image, path: Path) -> None:
 
 
 def _decoded(text: str, path: Path) -> bytes:
-    """The bytes of the data records, in the file's order, which is that of their addresses."""
+    """Bytes of the data records, in the file's order, which is that of their addresses."""
     found = bytearray()
     for number, line in enumerate(text.split(), 1):
         try:
@@ -96,7 +96,7 @@ def _decoded(text: str, path: Path) -> bytes:
         except ValueError:
             record = b""
         if not line.startswith(":") or len(record) < 5 or len(record) != record[0] + 5 or sum(record) % 256:
-            raise ImageError(f"{path}, line {number}: damaged, or not in Intel's HEX format")
+            raise ImageError(f"{path}, line {number}: damaged, or not in Intel HEX format")
         if record[3] == 0:
             found += record[4:-1]
     return bytes(found)

@@ -1,10 +1,10 @@
-"""Gaits: what counts as speed, the search for the fastest and for the most robust, a library for scenarios.
+"""Gaits: the definition of speed, searches for the fastest and the most robust gait, and a library for scenarios.
 
 from bifa.gait import Settings, optimize, simulations
 with simulations() as runs:
     optimum = optimize(model, runs, Settings(robust=True, seed=1))
 
-Names are loaded when they are used: the library of gaits is read without the seconds that the search takes to import.
+Names are imported on first use, so that the library can be read without the seconds it takes to import the search.
 """
 
 import importlib

@@ -1,4 +1,4 @@
-"""What sets a gait apart from another, and why it is faster: the paper's three reasons (section VI.A) as numbers."""
+"""How two gaits differ and why one is faster: the paper's three reasons (section VI.A) as numbers."""
 
 from dataclasses import dataclass
 
@@ -16,9 +16,10 @@ _RATE_HZ = 1000.0
 class Anatomy:
     """One settled cycle of a gait on a model. Times in s, pressures in psi.
 
-    extension_s, contraction_s: from the body's command to the passing of its unstable point; NaN if it never passes.
-    tail_lead_s: how long before the body extends the tail is told to anchor; head_lead_s: the head, before the body
-    contracts (negative: after). extended_psi, contracted_psi: pressure in the body when the next command comes.
+    extension_s, contraction_s: from the body's command until it passes its unstable point; NaN if it never does.
+    tail_lead_s: from the tail's command to anchor to the body's command to extend; head_lead_s: from the head's to the
+    body's command to contract (negative: after it). extended_psi, contracted_psi: body pressure when the next command
+    is given.
     """
 
     gait: Gait
@@ -34,7 +35,7 @@ class Anatomy:
 
 
 def anatomy(model: Model, gait: Gait) -> Anatomy:
-    """Walk the gait and take its last cycle apart."""
+    """Simulate the gait and analyse its last cycles."""
     samples = round(CYCLES * gait.period_s * _RATE_HZ) + 1
     record = walk(model, gait, time_s=np.arange(samples) / _RATE_HZ)
     time, head = record["time_s"], record["displacement_head_mm"]
@@ -59,33 +60,33 @@ def anatomy(model: Model, gait: Gait) -> Anatomy:
 
 
 def reasons(before: Anatomy, after: Anatomy) -> list[str]:
-    """Sentences on what changed from `before` to `after`, each with its figures."""
+    """Describe what changed from `before` to `after`, one sentence with figures for each reason."""
     model_supply = max(abs(before.extended_psi), abs(after.extended_psi))
     return [
         f"Speed {before.speed_mm_s:.1f} to {after.speed_mm_s:.1f} mm/s: the cycle takes {after.gait.period_s:.2f} s "
-        f"in place of {before.gait.period_s:.2f} s and advances {after.advance_mm:.1f} mm "
-        f"in place of {before.advance_mm:.1f} mm.",
+        f"instead of {before.gait.period_s:.2f} s and advances {after.advance_mm:.1f} mm "
+        f"instead of {before.advance_mm:.1f} mm.",
         f"The body has {100 * after.gait.duty_body:.0f} % of the cycle to contract, previously "
         f"{100 * before.gait.duty_body:.0f} %: it snaps {_seconds(after.contraction_s)} after the command when "
-        f"contracting, {_seconds(after.extension_s)} when extending, since the bulging fabric empties slowly.",
+        f"contracting, {_seconds(after.extension_s)} when extending, because the bulging fabric deflates slowly.",
         f"The tail is commanded to anchor {_lead(after.tail_lead_s)} the body's extension, previously "
         f"{_lead(before.tail_lead_s)}; the head {_lead(after.head_lead_s)} its contraction, previously "
         f"{_lead(before.head_lead_s)}: the body responds later than the ends, so less waiting is needed.",
         f"The body's pressure is reversed at {after.extended_psi:.1f} and {after.contracted_psi:.1f} psi, previously "
         f"{before.extended_psi:.1f} and {before.contracted_psi:.1f} psi: passing the spring's peak is enough, "
-        f"the supplies' full pressure ({model_supply:.1f} psi was reached) is not needed.",
+        f"and the full supply pressure ({model_supply:.1f} psi was reached) is not needed.",
     ]
 
 
 def _switch(gait: Gait, chamber: str, to_positive: bool) -> float:
-    """Time of a chamber's switch within the cycle: phase 2 pi d to positive, phase 0 to vacuum."""
+    """Time of a chamber's switch within the cycle: at phase 2 pi d to positive, at phase 0 to vacuum."""
     values = gait.as_dict()
     ahead = {"body": 0.0, "head": gait.psi12_deg, "tail": gait.psi13_deg}[chamber] / 360.0
     return ((values[f"duty_{chamber}"] if to_positive else 0.0) - ahead) % 1.0 * gait.period_s
 
 
 def _late(within_cycle: float, gait: Gait) -> float:
-    """That moment in the last cycle but one, so that what follows is on record."""
+    """Shift a time within the cycle to the last cycle but one, so that what follows it is recorded."""
     return (CYCLES - 2) * gait.period_s + within_cycle
 
 

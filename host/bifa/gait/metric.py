@@ -1,7 +1,7 @@
-"""What counts as the speed of a gait (paper, section V.B, with the loopholes closed).
+"""Definition of a gait's speed (paper, section V.B, with the loopholes closed).
 
-The paper takes the last of four cycles. Some gaits are still accelerating then and collapse later, so a gait has to
-be periodic here; and a gait that slips counts nothing, as in the paper: it is hard to reproduce on a real robot.
+The paper takes the last of four cycles. Some gaits are still accelerating then and collapse later, so here a gait has
+to be periodic. As in the paper a gait that slips scores 0, because it is hard to reproduce on a real robot.
 """
 
 from dataclasses import dataclass, replace
@@ -13,24 +13,24 @@ from bifa.simulate import Advance
 from bifa.simulate.rigs import CLEAR
 from bifa.simulate.terrain import passed_at_m, terrain, tunnel
 
-# The body is shorter than this under any pressure: the tail's end is behind by no more when the head's has come so far.
+# Upper bound on the body's length under any pressure, and so on how far the tail's end is behind the head's.
 _LONGEST_BODY_M = 0.06
-# Of the advance: on a supply that ripples every cycle is another, and a robot that drags a longer tether in each never
-# is periodic to a thousandth; one that falls differs by more.
+# Share of the advance by which cycles may differ on a rippling supply or with a growing tether: such walks are never
+# periodic to a thousandth, but a gait that fails differs by more.
 _UNLIKE = 0.2
 
 
 @dataclass(frozen=True)
 class Judged:
-    """Of n walks: `speed_mm_s`; `refused`: the metric's rules are broken; both of shape (n,)."""
+    """Judgement of n walks: `speed_mm_s`, and `refused` where the metric's rules are broken; both of shape (n,)."""
 
     speed_mm_s: np.ndarray
     refused: np.ndarray
 
     @property
     def counted_mm_s(self) -> np.ndarray:
-        """(n,) what the optimiser sees: 0 where the rules are broken, the robot goes the wrong way, or it
-        cannot be simulated (a spring beyond its curve's end)."""
+        """(n,) values for the optimiser: 0 where the rules are broken, the robot moves the wrong way, or it cannot be
+        simulated (a spring beyond the end of its curve)."""
         return np.where(self.refused, 0.0, np.fmax(self.speed_mm_s, 0.0))
 
 
@@ -38,12 +38,12 @@ class Judged:
 class Metric:
     """Settled speed in a clear pipe.
 
-    cycles: simulated, from rest. judged: the last so many, whose mean speed counts; they must agree within `periodic`
-    (of the advance, which counts as at least 1 mm) and slip less than `slip_m` each. Slip is travel while both ends
-    slide. tolerance_m: of the integrator, a step. direction: -1 to count backward walking. inclination_deg: of the
-    pipe, uphill positive. clock: seconds that pass in one of the Uno's, by which gaits and speeds are meant.
-    dead_time_s: of the Uno's, in which a chamber is vented between the supplies. unlike: no cycle is like the one
-    before, and no walk settles.
+    cycles: number simulated, from rest. judged: number of last cycles whose mean speed counts; they must agree within
+    `periodic` (relative to the advance, or to 1 mm if that is more) and slip at most `slip_m` each. Slip is travel
+    while both ends slide. tolerance_m: of the integrator, per step. direction: -1 to count backward walking.
+    inclination_deg: of the pipe, uphill positive. clock: seconds per second of the Uno, to which gaits and speeds
+    refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies. unlike: every cycle
+    differs from the one before, so that no walk settles.
     """
 
     cycles: int = 10
@@ -59,7 +59,7 @@ class Metric:
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is of a walk forward through a level pipe."""
+        """Whether the metric is for walking forward through a level pipe."""
         return self.direction == 1 and self.inclination_deg == 0.0
 
     @property
@@ -68,26 +68,26 @@ class Metric:
         return CLEAR
 
     def finer(self) -> "Metric":
-        """For finalists: twenty cycles, the last ten of them judged, and a far smaller step."""
+        """Return the metric for finalists: twenty cycles, the last ten of them judged, and a far smaller step."""
         return replace(self, cycles=20, judged=10, tolerance_m=1e-7).in_full()
 
     def in_full(self) -> "Metric":
-        """As a walk is measured that never settles: by the second half of as many cycles as it is given. A tether lets
-        a gait fall after sixteen."""
+        """Return the metric with all the cycles of a measured walk, the second half judged, if walks never settle: with
+        a tether a gait may fail as late as after sixteen cycles."""
         return replace(self, cycles=MOST_CYCLES, judged=MOST_CYCLES // 2) if self.unlike else self
 
     def quicker(self) -> "Metric":
-        """For searches over many draws: six cycles, longer steps. What it lets through is judged again. A walk that
-        never settles keeps all its cycles: by six a search goes to where all fall later."""
+        """Return the metric for searches over many draws: six cycles, longer steps; the gaits it accepts are judged
+        again. Walks that never settle keep all their cycles: with six, a search ends at gaits that all fail later."""
         return replace(self, cycles=6, judged=2, periodic=max(self.periodic, 5e-3), tolerance_m=3e-5).in_full()
 
     def of_draws(self) -> "Metric":
-        """For robots that the model may be, the model itself among them: they may slip, and their cycles differ. A
-        speed that is measured counts however a robot comes by it."""
+        """Return the metric for drawn robots and, in a robust search, the model itself: they may slip, and their cycles
+        may differ, because a measured speed counts however it is achieved."""
         return replace(self, periodic=_UNLIKE, slip_m=np.inf)
 
     def of_unlike_cycles(self) -> "Metric":
-        """For a robot that never walks the same cycle twice."""
+        """Return the metric for a robot that never walks the same cycle twice."""
         return replace(self, periodic=_UNLIKE, unlike=True)
 
     def judge(self, progress: Advance) -> Judged:
@@ -101,9 +101,9 @@ class Metric:
 
 @dataclass(frozen=True)
 class Passage:
-    """Mean speed through the paper's 97 mm tunnel (section VI.B), 0 for a robot that is not through in `cycles`.
+    """Mean speed through the paper's 97 mm tunnel (section VI.B), 0 for a robot that is not through after `cycles`.
 
-    Slip is not counted against a gait here: to bend the supports both ends may give way.
+    Slip is allowed here: both ends may give way while the supports bend.
     """
 
     cycles: int = 16
@@ -118,27 +118,27 @@ class Passage:
         return terrain(tunnel())
 
     def finer(self) -> "Passage":
-        """For finalists: a smaller step."""
+        """Return the metric for finalists: a smaller step."""
         return replace(self, tolerance_m=1e-6)
 
     def in_full(self) -> "Passage":
-        """The same: a tunnel is passed or not."""
+        """Return the same metric: a tunnel is passed or not."""
         return self
 
     def quicker(self) -> "Passage":
-        """As many cycles, since the tunnel has to be passed; longer steps."""
+        """Return the metric with longer steps and as many cycles, since the tunnel has to be passed."""
         return replace(self, tolerance_m=3e-5)
 
     def of_draws(self) -> "Passage":
-        """For robots that the model may be: the same."""
+        """Return the same metric for drawn robots."""
         return self
 
     def of_unlike_cycles(self) -> "Passage":
-        """The same: no cycle is compared with another."""
+        """Return the same metric: cycles are not compared with one another."""
         return self
 
     def judge(self, progress: Advance) -> Judged:
-        """Time until the whole robot is behind the tunnel, from simulated cycles of shape (n, cycles)."""
+        """Mean speed until the whole robot is past the tunnel, from simulated cycles of shape (n, cycles)."""
         way = passed_at_m(tunnel()) + _LONGEST_BODY_M
         reached = np.cumsum(progress.advance_m, axis=1)
         passed = reached >= way

@@ -1,4 +1,4 @@
-"""What is maximised: the nominal model's speed, or the speed that nearly every robot reaches."""
+"""The objectives: speed on the nominal model, or the speed that nearly every robot reaches."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from bifa.simulate import Plant, gait_rows
 
 QUANTILE = 0.10
 _FIRST_DRAWS = 3
-_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0  # multiples of it, without their whole parts, lie evenly however many there are
+_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0  # the fractional parts of its multiples are evenly spread, however many
 
 
 class NominalSpeed:
@@ -22,22 +22,22 @@ class NominalSpeed:
         self._runs, self._plant, self._space, self._metric = runs, plant, space, metric
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """(n,) of points (n, dimensions) of the unit cube."""
+        """Speeds (n,) at points (n, dimensions) of the unit cube."""
         return on_model(self._runs, self._plant, gait_rows(self._space.gaits(points)), self._metric)
 
 
 class RobustSpeed:
-    """A low quantile, `share`, of the speed over draws of the model, every gait meeting the same draws and the model
-    itself, which bounds it, all by the metric's rules for draws.
+    """A low quantile, `share`, of the speed over drawn robots, limited by the speed on the model itself. All gaits are
+    evaluated on the same draws, by the metric's rules for draws.
 
-    Draws come one round at a time. With n draws the quantile is the r-th smallest speed, r = ceil(share n), so
-    the r-th smallest met so far bounds it from above: a gait whose bound is below `abandon` of the best value
-    is given up, and the bound is its value. Draws that gave up most gaits come first, and a gait is settled where a
-    round lowers its bound no more: the rest are easier.
+    Draws are simulated in batches. With n draws the quantile is the r-th smallest speed, r = ceil(share n), so the r-th
+    smallest so far bounds it from above: a gait whose bound is below `abandon` of the best value is abandoned, with the
+    bound as its value. Draws on which most gaits failed come first, and a gait is accepted once another batch no longer
+    lowers its bound (the remaining draws are easier).
 
-    `jitter`: each draw has a share of its own within it by which it walks every gait slower or faster. With which
-    periods a robot walks is ragged at the cliff, and a climb ends on the first spike that it meets; over draws that
-    differ in period as well spikes narrower than that even out.
+    jitter: every draw walks all gaits slower or faster by a fixed fraction of its own within it. At the cliff the set
+    of periods with which a robot walks is ragged, and a climb ends on the first spike; over draws that differ in period
+    narrower spikes average out.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class RobustSpeed:
         self._longer = 1.0 + jitter * (2.0 * np.mod(_GOLDEN * np.arange(len(draws)), 1.0) - 1.0)
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """(n,) of points (n, dimensions) of the unit cube, in mm/s."""
+        """Values (n,) in mm/s at points (n, dimensions) of the unit cube."""
         rows = gait_rows(self._space.gaits(points))
         draws = len(self._draws)
         order = np.argsort(-self._failures, kind="stable")
@@ -68,7 +68,7 @@ class RobustSpeed:
         bound = self._own(points)
         alive = np.flatnonzero(bound >= max(self._abandon * self._best, 1e-9))
         done, size = 0, _FIRST_DRAWS + self._rank
-        told = size if self._failures.any() else draws  # how many a gait meets before a round may tell of the rest
+        told = size if self._failures.any() else draws  # draws before a batch may settle a gait
         while alive.size and done < draws:
             batch = order[done : done + size]
             gaits, which = np.repeat(alive, len(batch)), np.tile(batch, alive.size)
@@ -90,12 +90,12 @@ class RobustSpeed:
 
 
 def on_model(runs: Simulations, nominal: Plant, gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:
-    """(n,) speeds of gaits (n, 6) on the model itself, by the metric's rules, in mm/s."""
+    """Speeds (n,) in mm/s of gaits (n, 6) on the model itself, by the metric's rules."""
     return runs.judged([nominal], np.zeros(len(gaits), dtype=np.int64), gaits, metric).counted_mm_s
 
 
 def distribution(runs: Simulations, draws: Sequence[Plant], gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:
-    """(n, draws) speeds of gaits (n, 6) on every draw, by the metric's rules for draws, in mm/s."""
+    """Speeds (n, draws) in mm/s of gaits (n, 6) on every draw, by the metric's rules for draws."""
     n, m = len(gaits), len(draws)
     judged = runs.judged(draws, np.tile(np.arange(m), n), np.repeat(gaits, m, axis=0), metric.of_draws())
     return judged.counted_mm_s.reshape(n, m)

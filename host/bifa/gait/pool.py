@@ -1,4 +1,4 @@
-"""Many walks at once, through any `concurrent.futures.Executor`: this machine's cores, or a cluster's."""
+"""Many simulated walks in parallel on any `concurrent.futures.Executor`: this machine's cores or a cluster."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -13,14 +13,14 @@ from bifa.simulate import Plant, cores, speeds
 
 
 class Simulations:
-    """Runs walks on `executor`. The simulator releases the GIL, so threads do on one machine."""
+    """Runs walks on `executor`. The simulator releases the GIL, so on one machine threads suffice."""
 
     def __init__(self, executor: Executor, workers: int):
         self._executor, self._workers = executor, workers
         self.count = 0
 
     def judged(self, plants: Sequence[Plant], which: np.ndarray, gaits: np.ndarray, metric: Metric | Passage) -> Judged:
-        """Judge walks of `gaits` (n, 6), row k with the model `plants[which[k]]`."""
+        """Simulate `gaits` (n, 6), row k on the robot `plants[which[k]]`, and judge the walks."""
         self.count += len(gaits)
         progress = speeds(
             [plants[i] for i in which],
@@ -38,7 +38,7 @@ class Simulations:
 
 @contextmanager
 def simulations(dask: str | None = None, workers: int | None = None, tls: Tls = Tls()) -> Iterator[Simulations]:  # noqa: B008
-    """On this machine's cores, or on the dask cluster whose scheduler is at the address `dask`."""
+    """Yield `Simulations` on this machine's cores, or on the dask cluster with its scheduler at the address `dask`."""
     if dask is None:
         count = workers or cores()
         with ThreadPoolExecutor(count, thread_name_prefix="bifa-gait") as executor:

@@ -1,4 +1,4 @@
-"""What is predicted of a gait: an interval of the speed, and the probability that the robot walks with it at all."""
+"""Prediction of a gait: an interval of the speed, and the probability that the robot walks with it at all."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from bifa.robot.model import Model
 from bifa.simulate import gait_rows, speeds
 
 DRAWS = 256
-FINE_M = 1e-6  # a gait at the edge is judged with the fine step
+FINE_M = 1e-6  # integration step for gaits near the edge
 CYCLES = 16
-FELL = 0.8  # of the median of those that walk: what is slower does not walk as predicted
-_FASTEST = 0.98  # of the draws are slower than where those that walk are looked for: at a cliff most may fall
+FELL = 0.8  # of the median of the robots that walk: slower ones do not walk as predicted
+_FASTEST = 0.98  # quantile from which walking robots are identified: at a cliff most robots may fall
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Speeds in mm/s of a gait on `DRAWS` robots of what is known, each in a walk of its own, those that fall behind
-    included; `cycles`: by which nearly all have settled; `backward`: that is the way the speeds are along.
+    """Speeds in mm/s of a gait on `DRAWS` robots drawn from what is known, one walk each, failed walks included.
+    `cycles`: after which nearly all have settled; `backward`: speeds are counted backward.
 
-    The speed and its interval are those of the robots that walk, however few: how many do is `walks_probability`."""
+    The speed and its interval refer to the robots that walk, however few; `walks_probability` is how many do."""
 
     speeds_mm_s: np.ndarray
     cycles: int
@@ -35,7 +35,7 @@ class Prediction:
 
     @cached_property
     def walks(self) -> np.ndarray:
-        """(n,) which of the robots walk: those not slower than four fifths of the median of them all."""
+        """(n,) which robots walk: those that reach four fifths of the median of all that walk."""
         walking = self.speeds_mm_s >= FELL * np.quantile(self.speeds_mm_s, _FASTEST)
         while walking.any():
             least = max(FELL * float(np.median(self.speeds_mm_s[walking])), STANDING_MM_S)
@@ -46,22 +46,22 @@ class Prediction:
 
     @property
     def walks_probability(self) -> float:
-        """The share of them, by Laplace's rule: none is certain."""
+        """Share of the robots that walk, by Laplace's rule of succession, so that it is never 0 or 1."""
         return float((self.walks.sum() + 1.0) / (len(self.walks) + 2.0))
 
     @property
     def speed_mm_s(self) -> float:
-        """The median of those that walk, negative backward; 0 where none does."""
+        """Median speed of the robots that walk, negative if backward; 0 if none does."""
         return self._quantile(0.5)
 
     def interval_mm_s(self, probability: float) -> tuple[float, float]:
-        """Of the speed, where the robot walks."""
+        """Interval of the speed, provided that the robot walks."""
         low, high = sorted(self._quantile(0.5 + side * probability) for side in (-0.5, 0.5))
         return low, high
 
     @property
     def interval_90_mm_s(self) -> tuple[float, float]:
-        """The same at 90 %."""
+        """The 90 % interval of the speed."""
         return self.interval_mm_s(0.9)
 
     def holds(self, measured_mm_s: float, probability: float = 0.9) -> bool:
@@ -71,7 +71,7 @@ class Prediction:
 
     @property
     def text(self) -> str:
-        """For people."""
+        """The prediction in words."""
         low, high = self.interval_90_mm_s
         return (
             f"{self.speed_mm_s:.2f} mm/s ({low:.2f} to {high:.2f}) if it walks, with probability "
@@ -80,7 +80,7 @@ class Prediction:
 
     @property
     def as_record(self) -> dict[str, object]:
-        """For summaries and provenance, by the names of the contract."""
+        """Plain types for summaries and provenance."""
         return {
             "speed_mm_s": round(self.speed_mm_s, 3),
             "interval_90_mm_s": [round(v, 3) for v in self.interval_90_mm_s],
@@ -95,7 +95,7 @@ class Prediction:
 
 
 class Predictor:
-    """Predicts one gait after another of the same robots, drawn once from what is `known` of `model`."""
+    """Predicts gaits on the same robots, drawn once from what is `known` of `model`."""
 
     def __init__(self, model: Model, known: Knowledge, *, draws: int = DRAWS, seed: int = 0):
         self._timing, self._noise_share = known.scatter.timing, known.scatter.speed
@@ -104,10 +104,10 @@ class Predictor:
     def of(
         self, gait: Gait, *, cycles: int = CYCLES, clock_rate: float | None = None, workers: int | None = None
     ) -> Prediction:
-        """Walk `gait` on each robot, by the rule that measured walks are judged by: what never settles (a tether that
-        grows) is as fast as in the second half of its `cycles`.
+        """Walk `gait` on each robot and judge it by the rule for measured walks: if a walk never settles (a growing
+        tether), the second half of its `cycles` counts.
 
-        clock_rate: seconds per second of the Uno, if not what is known of it; speeds are those on the Uno's clock.
+        clock_rate: seconds per second of the Uno, default as known; speeds are on the Uno's clock.
         """
         draws, rate = len(self._robots), self._timing.clock if clock_rate is None else clock_rate
         rows = self._switched(gait_rows([gait] * draws))
@@ -118,7 +118,7 @@ class Predictor:
         found = [settling(one) for one in advance_mm]
         means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
         noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
-        camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (LEAST * gait.period_s)  # of a speed that is measured over so many
+        camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (LEAST * gait.period_s)  # of a speed measured over `LEAST` cycles
         means = means * (1.0 + self._noise_share * noise[0]) + noise[1] * camera_mm_s
         means = np.nan_to_num(means)
         backward = bool(np.mean(means) < -STANDING_MM_S)
@@ -126,11 +126,11 @@ class Predictor:
         return Prediction(along, _most(f.begins for f in found if f.is_settled) + LEAST, backward)
 
     def _switched(self, rows: np.ndarray) -> np.ndarray:
-        """The gaits (n, 6) as each walk has them, whose valves switch a little early or late: at a cliff half a
-        millisecond decides."""
+        """The gaits (n, 6) with valves that switch slightly early or late in each walk: at a cliff half a millisecond
+        decides."""
         most_s = self._timing.switch_error_s
         late_s = np.random.default_rng([self._seed, 6]).uniform(-most_s, most_s, (len(rows), 3, 2))
-        to_vacuum, to_positive = np.moveaxis(late_s, 2, 0) / rows[:, :1]  # of body, head, tail, in parts of the period
+        to_vacuum, to_positive = np.moveaxis(late_s, 2, 0) / rows[:, :1]  # body, head, tail, as fractions of the period
         rows[:, 1:3] -= 360.0 * (to_vacuum[:, 1:] - to_vacuum[:, :1])
         rows[:, 3:] = np.clip(rows[:, 3:] + to_positive - to_vacuum, 0.0, 1.0)
         return rows
@@ -146,16 +146,16 @@ def predict_speed(
     cycles: int = CYCLES,
     clock_rate: float | None = None,
 ) -> Prediction:
-    """What is predicted of one gait: see `Predictor`."""
+    """Predict the speed of one gait; see `Predictor`."""
     return Predictor(model, known, draws=draws, seed=seed).of(gait, cycles=cycles, clock_rate=clock_rate)
 
 
 def settles(model: Model) -> bool:
-    """Whether the model's walks come to be periodic, not one of its effects making each cycle unlike the one before."""
+    """Whether the model's walks become periodic: no effect makes each cycle differ from the one before."""
     return not any(library()[effect].unlike_cycles for effect in model.effects)
 
 
 def _most(begins: Iterable[int]) -> int:
-    """How many cycles nineteen of twenty robots take to settle."""
+    """Cycles within which nineteen of twenty robots settle."""
     every = list(begins)
     return int(np.ceil(np.quantile(every, 0.95))) if every else CYCLES

@@ -1,4 +1,4 @@
-"""From a model to a gait: explore, refine, verify the finalists, say how sure it is."""
+"""The search for a gait on a model: explore, refine, verify the finalists, report how certain the result is."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,20 +24,23 @@ from bifa.simulate import Plant, gait_rows, plant
 # (stage, share of the stage that is done, best value so far in mm/s) -> None
 OnProgress = Callable[[str, float, float], None]
 
-VERIFYING_DRAWS = 1024  # robots that the chosen gait meets, all new
+VERIFYING_DRAWS = 1024  # robots, none used in the search, on which the chosen gait is evaluated
 _NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 4
-# Of cma the most, for a landscape with many basins: it ends when its best runs agree. A quarter of them, where what is
-# fastest on the model is only where a search on robots begins.
+# Default budgets. That of cma is an upper limit, for landscapes with many basins: it stops once its best runs agree.
+# Robust searches get a quarter, because the gaits fastest on the model are only their starting points.
 EVALUATIONS = {"cma": 8000, "de": 4000, "bo": 1000}
 
 
 @dataclass(frozen=True)
 class RobustRound:
-    """Of a robust search: how many robots a gait meets, what quantile of the speed counts, the share of the best value
-    at which a gait is given up, the integrator's tolerance; the changes of period, in parts, that the gaits of the
-    round before are tried with; and of the CMA-ES runs on that: the most evaluations, their first step, how many there
-    are. `in_full`: walks have the metric's own number of cycles, since the quick one's are too few for those that
-    settle late. `jitter`: of the period, from robot to robot, in parts."""
+    """One round of a robust search.
+
+    draws: robots that each gait is evaluated on. quantile: of the speed, maximised. abandon: share of the best value
+    below which a gait is abandoned. tolerance_m: of the integrator, per step. periods: relative changes of the period
+    that the previous round's gaits are tried with. evaluations, step, climbs: budget, initial step and number of the
+    CMA-ES runs. in_full: walks have the metric's full number of cycles; the quick metric has too few for walks that
+    settle late. jitter: relative variation of the period from robot to robot.
+    """
 
     draws: int
     quantile: float
@@ -51,44 +54,47 @@ class RobustRound:
     jitter: float = 0.0
 
 
-# Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
-# in ten of its own robots fails would fail more often on others.
+# Few robots while gaits differ widely, many once they hardly differ. The quantiles are below 10 %: a gait tuned until
+# one in ten of its own robots fails would fail more often on others.
 EXPLORE = RobustRound(24, 0.08, 0.95, 1e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1400, 0.06, jitter=0.005)
-# At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
-# gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
+# At the cliff tiny changes of the period decide. Few robots favour periods that are too short, and so do integration
+# errors: with one gait 99 % of the robots walked at steps of 30 um, 65 % at 10 um, 34 % at 3 um, 27 % at 1 um and less.
 _REFINE = (
     RobustRound(32, 0.0625, 0.95, 3e-6, (0.0, 0.02, 0.04), 480, 0.008, climbs=3, jitter=0.005),
     RobustRound(128, 0.0677, 0.993, 3e-6, (0.0, 0.006, 0.012, -0.006), 192, 0.006, 2, in_full=True, jitter=0.002),
 )
-# By how many seconds each time of a gait is changed between climbs, which end on the first of many tops along it.
+# Changes, in s, of a gait's times that are tried between climbs: a climb ends at the first of many local optima.
 _LONGER_S: dict[str, tuple[float, ...]] = {name: (-0.1, -0.04, 0.04, 0.1) for name in TIMES}
 _LONGER_S |= {"body_vacuum": (-0.12, -0.06, -0.03, 0.03, 0.06), "body_pressure": (-0.02, 0.02, 0.05, 0.1)}
 _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004), in_full=True)
-# The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail
-# on others. Slower by these parts if need be.
+# Finalists are checked by the full metric: the quick one is lenient, and a gait that is best on some robots may fail
+# on others. Copies slower by these fractions follow.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
-_BASINS, _STARTS = 24, 8  # of the explored gaits, where climbs on robots begin; without climbs, those to refine
-_NEAR, _FAR = 0.003, 0.02  # of two finalists, on some axis of the unit cube: at one place, and at others
-# Climbs on robots: from how many families, and how near the best these and the ends of the round before have to come.
+_BASINS, _STARTS = 24, 8  # explored gaits where climbs on robots start; those to refine if there were no climbs
+_NEAR, _FAR = 0.003, 0.02  # minimum distance between finalists, on some axis of the unit cube
+# Climbs on robots: how many families to start from, and the shares of the best value that these, and the end points of
+# the previous round, must reach.
 _FAMILIES, _FAMILY_WORTH, _END_WORTH = 3, 0.9, 0.95
-# Of the best value, when it is checked: what a gait has to keep to be taken at once, and to be one that stands.
+# Shares of the best value that a gait must keep in the check: to be accepted at once, and to count as walking.
 _KEPT, _PROMISED = 0.993, 0.5
 _NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
-_FINAL_STEP, _FINAL = 0.015, 600  # the same for the model's own speed
+_FINAL_STEP, _FINAL = 0.015, 600  # initial step and budget of the refinement on the model itself
 
 
 class SearchError(BifaError):
-    """No usable gait was found; the text says what to change."""
+    """No usable gait was found; the message says what to change."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to search. `evaluations` None: a number that suits the method. `spread` None: what is known of the model, or
-    2 % where nothing was fitted; `naive`: of that the covariance alone. `share`: of the robots, how many may be slower
-    than what is maximised. `refine`: follow the method with small CMA-ES runs from its best points (the paper did not).
-    `begin`: gaits that are known to walk: the search begins from them as well, and of what is known of the model robots
-    that do not walk with them are left out.
+    """Settings of a search.
+
+    evaluations: None for the method's default. spread: relative; None for what is known of the model, or 2 % if nothing
+    was fitted. naive: draw robots from the covariance alone. share: fraction of the robots that may be slower than the
+    speed that is maximised. refine: follow the method with short CMA-ES runs from its best points (the paper did not).
+    begin: gaits that are known to walk; the search also starts from them, and drawn robots that do not walk with them
+    are discarded.
     """
 
     method: str = "cma"
@@ -105,22 +111,22 @@ class Settings:
 
     @property
     def rules(self) -> Metric | Passage:
-        """What gaits are judged by: a robust search judges the model itself as it judges its draws."""
+        """The metric that applies: a robust search judges the model itself by the rules for drawn robots."""
         return self.metric.of_draws() if self.robust else self.metric
 
     def knowledge(self, model: Model) -> Knowledge:
-        """From which the robots are drawn."""
+        """Return the distribution that robots are drawn from."""
         known = spread_of(model, self.spread)
         return known.naive if self.naive else known
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """The gait and what is known of it.
+    """The best gait found, with its predicted performance.
 
-    nominal_mm_s: verified on the model itself, 20 cycles with a finer step. speeds_mm_s: (n,) on `VERIFYING_DRAWS`
-    robots that the search never met; quantile_mm_s: what all but the settings' share of them reach. explored: what the
-    method evaluated. prediction: of a walk.
+    nominal_mm_s: speed on the model itself, verified over 20 cycles with a finer step. speeds_mm_s: (n,) speeds on
+    `VERIFYING_DRAWS` robots that the search never used; quantile_mm_s: the speed that all but `settings.share` of them
+    reach. explored: everything the method evaluated. prediction: of a walk with the gait.
     """
 
     gait: Gait
@@ -136,20 +142,20 @@ class Optimum:
 
     @property
     def doubt(self) -> str:
-        """A sentence where the best two independent runs of the search did not come to the same speed; else empty."""
+        """A warning if the best two independent runs of the search ended at different speeds; otherwise empty."""
         if self.explored.ends is None or self.explored.agrees:
             return ""
         ends = self.explored.ends.values
         first, second = (*ends, 0.0)[:2]
         return (
-            f"the search has not settled: its best two of {len(ends)} runs ended at {first:.2f} and "
+            f"the search has not converged: its best two of {len(ends)} runs ended at {first:.2f} and "
             f"{second:.2f} mm/s, so a faster gait may exist; search longer with --evaluations, or try another --seed"
         )
 
 
 @dataclass(frozen=True)
 class SearchRun:
-    """A search under way: the model, what is `known` of it, and who is told how it gets on."""
+    """A search in progress: the model, what is `known` of it, and the progress callback."""
 
     model: Model
     runs: Simulations
@@ -158,11 +164,11 @@ class SearchRun:
     on_progress: OnProgress = lambda stage, share, best: None
 
     def telling(self, stage: str, budget: int, least: float = -np.inf) -> OnEvaluated:
-        """Tells of a stage of `budget` evaluations, when `least` has been reached before."""
+        """Return a progress callback for a stage of `budget` evaluations; `least`: best value before the stage."""
         return lambda count, best: self.on_progress(stage, min(count / budget, 1.0), max(best, least))
 
     def objective(self, stage: RobustRound, number: int) -> RobustSpeed:
-        """Of a round, on robots of its own."""
+        """Return the objective of a round, on robots of its own."""
         settings = self.settings
         draws = self.robots(stage.draws, settings.seed + 500_000 * number)
         metric = settings.metric.in_full() if stage.in_full else settings.metric.quicker()
@@ -172,9 +178,9 @@ class SearchRun:
         return RobustSpeed(self.runs, nominal, draws, space, metric, share, stage.abandon, stage.jitter)
 
     def robots(self, count: int, seed: int) -> list[Plant]:
-        """`count` robots that the model may be: they walk with the gaits that it is known to walk with, which a
-        covariance does not know. Where hardly half of those drawn do, the model does not know either, and they are as
-        drawn; so they are if the spread is a guess."""
+        """Draw `count` robots that walk with `settings.begin`, gaits with which the real one is known to walk: the
+        covariance does not contain that constraint. If fewer than half of the drawn robots meet it, the model does not
+        contain it either and the draws are returned unfiltered; likewise if the spread is a guess."""
         drawn = self.known.plants(self.model, count, seed)
         if self.known.is_guess or not self.settings.begin:
             return drawn
@@ -189,20 +195,20 @@ class SearchRun:
         return walking[:count] if len(walking) >= count else drawn
 
     def verifying_robots(self) -> list[Plant]:
-        """Those that an optimum's speeds are of."""
+        """Draw the robots that `Optimum.speeds_mm_s` refers to."""
         return self.robots(VERIFYING_DRAWS, self.settings.seed + 2_000_003)
 
     def finely(self, rows: np.ndarray) -> np.ndarray:
-        """(n,) speeds of gaits (n, 6) on the model itself by the finer metric."""
+        """Speeds (n,) of gaits (n, 6) on the model itself by the finer metric."""
         return on_model(self.runs, plant(self.model), rows, self.settings.rules.finer())
 
 
 def optimize(
     model: Model, runs: Simulations, settings: Settings | None = None, on_progress: OnProgress | None = None
 ) -> Optimum:
-    """Find the gait that maximises the settled speed, of the model or robustly. Deterministic for a seed.
+    """Find the gait that maximises the settled speed, on the model itself or robustly. Deterministic for a given seed.
 
-    Raises SearchError where no gait in the space walks by the metric's rules.
+    Raises SearchError if no gait in the space walks by the metric's rules.
     """
     settings = settings or Settings()
     if settings.method not in METHODS:
@@ -248,7 +254,7 @@ def optimize(
 
 
 def _predicted(search: SearchRun, gait: Gait, speeds: np.ndarray) -> Prediction:
-    """By the rule of measured walks; where the metric is another (up a pipe, through a tunnel), by the metric's own."""
+    """Predict by the rule for measured walks; for other metrics (up a pipe, through a tunnel) by the metric itself."""
     metric = search.settings.metric
     if not (isinstance(metric, Metric) and metric.is_plain):
         return Prediction(speeds, metric.cycles)
@@ -266,8 +272,8 @@ def _explore(search: SearchRun, objective: Objective) -> Evaluated:
 
 
 def explore_on_robots(search: SearchRun, explored: Evaluated) -> Evaluated:
-    """CMA-ES on a few robots from families of gaits, from the basins of the model's own speed, and from the gaits to
-    begin with: from slower copies too, since the fastest are beyond the cliff of most robots, whose objective is 0."""
+    """Run CMA-ES on a few robots, from gait families, the basins of the nominal speed, and `settings.begin`. Slower
+    copies are tried too: the nominally fastest gaits are beyond the cliff of most robots, where the objective is 0."""
     settings, space, wraps = search.settings, search.settings.space, search.settings.space.wraps
     budget = _scaled(EXPLORE.evaluations, settings)
     recorder = RecordedObjective(search.objective(EXPLORE, 0), wraps, search.telling("search on robots", budget))
@@ -281,10 +287,9 @@ def explore_on_robots(search: SearchRun, explored: Evaluated) -> Evaluated:
 
 
 def _suited(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
-    """Of each point (n, dimensions) the best copy: with the best of these periods, then with one of its times the
-    best."""
+    """Improve each point (n, dimensions): take the best of the period changes, then the best change of one time."""
     tried = _at_periods(space, points, periods)
-    # One by one: what is worse than the best so far meets few robots.
+    # One call each: gaits worse than the best so far are evaluated on few robots only.
     points = _best_copies(tried, [objective(one) for one in tried]).points
     retimed = [space.retimed(points, {name: by}) for name, each in _LONGER_S.items() for by in each]
     values = objective(np.concatenate([points, *retimed]))
@@ -292,7 +297,7 @@ def _suited(objective: Objective, space: SearchSpace, points: np.ndarray, period
 
 
 def _best_copies(copies: Sequence[np.ndarray], values: Sequence[np.ndarray]) -> Evaluated:
-    """Of each point the best of its copies, (n, dimensions) each, which have these values, (n,) each."""
+    """Select the best copy of each point; `copies` are (n, dimensions) each, their `values` (n,) each."""
     best, every = np.argmax(values, axis=0), np.arange(len(copies[0]))
     return Evaluated(np.array(copies)[best, every], np.array(values)[best, every])
 
@@ -306,12 +311,12 @@ def _usual(settings: Settings) -> int:
 
 
 def _scaled(evaluations: int, settings: Settings) -> int:
-    """As many more or fewer than usual as of the method's."""
+    """Scale `evaluations` by the ratio of the chosen budget to the default one."""
     return max(2 * POPULATION, round(evaluations * _budget(settings) / _usual(settings)))
 
 
 def _refine(search: SearchRun, objective: Objective, explored: Evaluated) -> Evaluated:
-    """CMA-ES from the best."""
+    """Run CMA-ES from the best explored point."""
     settings = search.settings
     budget = _scaled(_FINAL, settings)
     telling = search.telling("refine", budget, explored.best_value)
@@ -321,8 +326,8 @@ def _refine(search: SearchRun, objective: Objective, explored: Evaluated) -> Eva
 
 
 def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]:
-    """CMA-ES in rounds of more robots each, every time from where the climbs of the round before ended: those ends that
-    these robots like best, since what was best on few robots may owe it to them."""
+    """Run CMA-ES in rounds with more and more robots, each from the end points of the previous round, ranked again on
+    the new robots: the best on few robots may be so by chance."""
     settings, wraps = search.settings, search.settings.space.wraps
     ended = explored.finalists(_STARTS, APART, wraps) if explored.ends is None else explored.ends.points
     found = []
@@ -341,8 +346,8 @@ def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]
 
 
 def _nominally(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:
-    """The fastest of the finalists by the finer metric. Many fall, since the fastest gaits live at a cliff; where none
-    reaches half of what was promised, those in other places are asked, and then slower copies of all of them."""
+    """Return the fastest finalist by the finer metric, with its speed. Many fail, because the fastest gaits are at a
+    cliff; if none reaches half of the best explored value, finalists further apart and then slower copies are tried."""
     space, rows, speeds = search.settings.space, np.empty((0, 6)), np.empty(0)
     near, far = (explored.finalists(_NOMINAL_FINALISTS, apart=apart) for apart in (_NEAR, _FAR))
     slower = np.concatenate([space.slower(points, share) for points in (near, far) for share in _SLOWER])
@@ -359,24 +364,24 @@ def _nominally(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:
 
 
 def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated) -> tuple[Gait, float]:
-    """The first of the finalists that keeps what the best promised, over robots that the search did not meet; slower
-    copies of it follow, for the case that all are beyond the cliff. Where none does, the best of them that stand; where
-    none stands, the one that walks best on average."""
+    """Return the first finalist that keeps `_KEPT` of the best value on robots the search did not use, and its speed.
+    Slower copies of the best one follow, in case all finalists are beyond the cliff. If none keeps that much, the best
+    of those that keep `_PROMISED` is taken, and failing that, the one with the highest mean speed."""
     settings, space = search.settings, search.settings.space
     finalists = refined.finalists(_ROBUST_FINALISTS, apart=_NEAR)
     objective = search.objective(_SHORTLIST, 3)
     shortlist = np.concatenate(_at_periods(space, finalists, _SHORTLIST.periods))
-    # One by one: what is worse than the best so far meets few robots, the hardest first.
+    # One call each: gaits worse than the best so far are evaluated on few robots only, the hardest first.
     values = np.concatenate([objective(point[None]) for point in shortlist])
     search.on_progress("verify", 0.6, float(values.max()))
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
     checking = search.robots(_CHECKING_DRAWS, settings.seed + 2_500_000)
     metric = replace(settings.metric.in_full(), tolerance_m=FINE_M)
-    # Of what the best promised, not of what this one does on the model: there it may have fallen as well.
+    # Relative to the best value of the shortlist, not to the gait's speed on the model, where it may have failed too.
     least = max(_PROMISED * float(values.max()), STANDING_MM_S)
     near = np.concatenate([best, *(space.slower(best[:1], share) for share in _SLOWER)])
-    # Only where none of these walks at all by the metric in full: what the method found elsewhere.
+    # Finalists from elsewhere, used only if none of the above walks at all by the full metric.
     far = explored.finalists(_NOMINAL_FINALISTS, apart=_FAR)
     otherwise, most = None, (False, -1.0)
     for candidates in (near, far):
@@ -397,5 +402,5 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
 
 
 def _at_periods(space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> list[np.ndarray]:
-    """The points (n, dimensions) with their periods changed by each share of `periods`."""
+    """Copies of the points (n, dimensions), one array for each relative change of the period in `periods`."""
     return [space.slower(points, share) for share in periods]

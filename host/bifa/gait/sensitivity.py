@@ -1,4 +1,4 @@
-"""How the speed answers to each gait parameter, and what robustness costs."""
+"""Sensitivity of the speed to each gait parameter, and what robustness costs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from bifa.ranges import RANGES
 from bifa.robot.gait import Gait
 from bifa.simulate import Plant, gait_rows
 
-# Half the width of the scan of each parameter: a relative change of the period, degrees, parts of the cycle.
+# Half-width of each parameter's scan: relative for the period, in degrees, or as a fraction of the cycle.
 _REACH = {"period_s": 0.15, "psi12_deg": 40.0, "psi13_deg": 40.0, "duty_body": 0.06, "duty_head": 0.1, "duty_tail": 0.1}
 
 
@@ -20,7 +20,7 @@ _REACH = {"period_s": 0.15, "psi12_deg": 40.0, "psi13_deg": 40.0, "duty_body": 0
 class Scan:
     """Speed along one gait parameter, the others held: `values` (n,), `nominal_mm_s` and `quantile_mm_s` (n,).
 
-    `room`: (lower, upper) neighbourhood of the gait's value within which the quantile stays above 90 % of its own.
+    room: (lower, upper) limits around the gait's own value within which the quantile stays above 90 % of the gait's.
     """
 
     name: str
@@ -40,7 +40,7 @@ def sensitivity(
     metric: Metric | Passage,
     points: int = 17,
 ) -> list[Scan]:
-    """One scan for each of the six parameters, `points` (odd) values each."""
+    """Scan each of the six parameters over `points` values (an odd number)."""
     base = gait.as_dict()
     scans, rows = {}, []
     for name, reach in _REACH.items():
@@ -83,7 +83,7 @@ class Front:
 
     @property
     def efficient(self) -> np.ndarray:
-        """(n,) true on the front."""
+        """(n,) True on the Pareto front."""
         better = (self.nominal_mm_s[None] > self.nominal_mm_s[:, None]) & (
             self.quantile_mm_s[None] > self.quantile_mm_s[:, None]
         )
@@ -99,12 +99,12 @@ def front(
     metric: Metric | Passage,
     points: int = 25,
 ) -> Front:
-    """Speed against robustness, from the robust gait to the fastest one, along and around the line between them."""
+    """Trade speed against robustness: evaluate gaits on and around the line from the robust gait to the fastest one."""
     ends = gait_rows([robust, fast])
     shift = ends[1] - ends[0]
     shift[1:3] = (shift[1:3] + 180.0) % 360.0 - 180.0  # the shorter way round
     rows = ends[0] + np.linspace(0.0, 1.0, points)[:, None] * shift
-    # The period alone is the cheapest way to trade: the same gaits, faster or slower.
+    # The period alone is the simplest trade-off: the same gaits, faster or slower.
     some, periods = rows[:: max(1, points // 6)], np.linspace(0.97, 1.03, 7)
     around = np.repeat(some, len(periods), axis=0)
     around[:, 0] = np.outer(some[:, 0], periods).ravel()

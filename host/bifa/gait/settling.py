@@ -1,5 +1,5 @@
-"""When a walk has settled, by one rule for simulated and for measured cycles; and the speed of a walk that was
-measured: net displacement per cycle, of the cycles that have settled."""
+"""Settling of walks, by one rule for simulated and measured cycles, and the speed of measured walks: net displacement
+per cycle over the settled cycles."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ import numpy as np
 
 from bifa.errors import BifaError
 
-WITHIN = 1e-3  # of the advance (at least 1 mm): by what settled cycles differ
-LEAST = 3  # settled cycles that are wanted
-MOST_CYCLES = 24  # that a walk is given to settle in
-STANDING_MM_S = 1.0  # slower is standing still
-CAMERA_MM = 0.1  # standard deviation of a place that a motion capture tells
+WITHIN = 1e-3  # of the advance (at least 1 mm): by how much settled cycles may differ
+LEAST = 3  # settled cycles required
+MOST_CYCLES = 24  # that a walk may take to settle
+STANDING_MM_S = 1.0  # a slower robot counts as standing still
+CAMERA_MM = 0.1  # standard deviation of a motion-capture position
 _SURE = 3.5  # standard deviations
 
 
 class Walking(StrEnum):
-    """What a walk has come to."""
+    """Outcome of a walk."""
 
     SETTLED = "settled"
-    UNSETTLED = "unsettled"  # it goes on changing from cycle to cycle
+    UNSETTLED = "unsettled"  # keeps changing from cycle to cycle
     STANDING = "standing"
 
 
 @dataclass(frozen=True)
 class Settling:
-    """`begins`: the first settled cycle, counted from 0; where none is, the walk's second half counts. `cycles` that
-    count; `varies`: by what part of their mean they differ."""
+    """Where a walk settles. begins: the first settled cycle, counted from 0, or the middle of the walk if none is.
+    cycles: number of cycles from there on; varies: their standard deviation relative to their mean."""
 
     is_settled: bool
     begins: int
@@ -38,11 +38,11 @@ class Settling:
 
 
 def settling(advance_mm: np.ndarray, noise_mm: float = 0.0) -> Settling:
-    """From which of the cycles on a walk is periodic, their advance being `advance_mm` (n,) and the standard deviation
-    of the places at their ends `noise_mm`.
+    """Find the cycle from which on a walk is periodic. `advance_mm` (n,): of each cycle; `noise_mm`: standard deviation
+    of the positions at the cycles' ends.
 
-    From there on no cycle differs from the mean, nor the later half of the cycles from the earlier half, by more than
-    `WITHIN` and what the noise may do; at least `LEAST` cycles are left.
+    From that cycle on no cycle differs from the mean, nor the later half of the cycles from the earlier half, by more
+    than `WITHIN` plus an allowance for the noise, and at least `LEAST` cycles are left.
     """
     advance_mm = np.asarray(advance_mm, dtype=float)
     count = len(advance_mm)
@@ -58,14 +58,14 @@ def _is_level(advance_mm: np.ndarray, noise_mm: float) -> bool:
         return False
     mean, half = float(advance_mm.mean()), len(advance_mm) // 2
     allowed = WITHIN * max(abs(mean), 1.0)
-    # A cycle is the difference of two places; half a walk's mean is that of two places, over so many cycles.
+    # A cycle is the difference of two positions; the mean over half a walk is such a difference over `half` cycles.
     off = np.abs(advance_mm - mean).max()
     trend = abs(advance_mm[-half:].mean() - advance_mm[:half].mean())
     return off <= allowed + _SURE * np.sqrt(2.0) * noise_mm and trend <= allowed + _SURE * 2.0 * noise_mm / half
 
 
 def walking(found: Settling, mean_mm_s: float) -> Walking:
-    """Robots that never settle are told from those that stand."""
+    """Classify a walk; robots that never settle are distinguished from those that stand still."""
     if abs(mean_mm_s) < STANDING_MM_S:
         return Walking.STANDING
     return Walking.SETTLED if found.is_settled else Walking.UNSETTLED
@@ -73,11 +73,11 @@ def walking(found: Settling, mean_mm_s: float) -> Walking:
 
 @dataclass(frozen=True)
 class MeasuredSpeed:
-    """Speed over the settled cycles of one walk; over its second half, if none has settled.
+    """Speed over the settled cycles of one walk, or over its second half if it has not settled.
 
     mean_mm_s: net displacement over those cycles divided by their duration.
     spread_mm_s: sample standard deviation of the single cycles' speeds (0 for one cycle).
-    cycles_mm_s: one speed for each of them. begins: how many cycles went before. walking: what it came to.
+    cycles_mm_s: speed of each of them. begins: number of cycles before them. walking: outcome of the walk.
     """
 
     mean_mm_s: float
@@ -88,12 +88,12 @@ class MeasuredSpeed:
 
     @property
     def settled_cycles(self) -> int:
-        """How many cycles have settled."""
+        """Number of settled cycles."""
         return 0 if self.walking is Walking.UNSETTLED else len(self.cycles_mm_s)
 
     @property
     def text(self) -> str:
-        """What a person is told of it."""
+        """The speed in words."""
         if self.walking is Walking.STANDING:
             return f"stands still ({self.mean_mm_s:.1f} mm/s)"
         if self.walking is Walking.UNSETTLED:
@@ -108,29 +108,29 @@ def measured_speed(
 ) -> MeasuredSpeed:
     """Speed of a walk that begins at `time_s[0]`, without the cycles in which it settles.
 
-    The displacement at a cycle's boundary is read off the record by linear interpolation; `noise_mm`, the standard
-    deviation of a displacement (0 of a simulated one), enters a cycle's speed as sqrt(2) `noise_mm` / period.
+    The displacement at a cycle's boundary is linearly interpolated; `noise_mm`, the standard deviation of a
+    displacement (0 if simulated), enters a cycle's speed as sqrt(2) `noise_mm` / period.
 
-    Raises BifaError where the record does not hold the `LEAST` cycles that it takes to see whether it has settled.
+    Raises BifaError if the record is shorter than the `LEAST` cycles needed to judge whether the walk has settled.
     """
     complete = complete_cycles(time_s, period_s)
     boundaries_s = time_s[0] + period_s * np.arange(complete + 1)
     advance_mm = np.diff(np.interp(boundaries_s, time_s, displacement_mm))
     if complete < LEAST:
         raise BifaError(
-            f"the walk has {complete} complete cycle(s) of {period_s:g} s; it takes {LEAST} to see whether it has "
+            f"the walk has {complete} complete cycle(s) of {period_s:g} s; {LEAST} are needed to judge whether it has "
             "settled: record a longer walk"
         )
     return speed_of_cycles(advance_mm, period_s, noise_mm)
 
 
 def complete_cycles(time_s: np.ndarray, period_s: float) -> int:
-    """How many a walk has that begins at `time_s[0]`."""
+    """Number of complete cycles of a walk that begins at `time_s[0]`."""
     return int(np.floor((time_s[-1] - time_s[0]) / period_s + 1e-6))
 
 
 def speed_of_cycles(advance_mm: np.ndarray, period_s: float, noise_mm: float = CAMERA_MM) -> MeasuredSpeed:
-    """The same from the advance in each cycle, of `LEAST` cycles or more."""
+    """Speed of a walk from the advance in each of its cycles, `LEAST` or more."""
     found = settling(advance_mm, noise_mm)
     cycles_mm_s = advance_mm[found.begins :] / period_s
     mean_mm_s = float(cycles_mm_s.mean())

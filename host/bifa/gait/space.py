@@ -1,4 +1,4 @@
-"""Where gaits are looked for: the paper's box (section V.B), and the map between it and the unit cube."""
+"""The space searched for gaits: the paper's box (section V.B), and its map to the unit cube."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,17 +9,17 @@ from bifa.errors import BifaError
 from bifa.ranges import RANGES
 from bifa.robot.gait import GAIT_NAMES, Gait, gait_rows
 
-# What `SearchSpace.retimed` changes.
+# Times of a gait that `SearchSpace.retimed` changes.
 TIMES = ("body_vacuum", "body_pressure", "head_ahead", "tail_ahead", "ends_vacuum")
 
 
 class SpaceError(BifaError):
-    """A search space is empty, or leaves what a gait may be; the text names the axis and the range."""
+    """A search space is empty or exceeds the range of a gait parameter; the message names the axis and the range."""
 
 
 @dataclass(frozen=True)
 class SearchAxis:
-    """One coordinate: the gait parameters that it sets together, its range, whether its ends meet."""
+    """One coordinate: the gait parameters that it sets together, its range, and whether it wraps (a full turn)."""
 
     name: str
     sets: tuple[str, ...]
@@ -39,17 +39,17 @@ class SearchAxis:
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Axes of the search. Points are rows of the unit cube, shape (n, dimensions)."""
+    """Axes of the search. Points are given in the unit cube, shape (n, dimensions)."""
 
     axes: tuple[SearchAxis, ...]
 
     @property
     def wraps(self) -> np.ndarray:
-        """(dimensions,) true where an axis is a full turn."""
+        """(dimensions,) True for axes that are full turns."""
         return np.array([axis.wraps for axis in self.axes])
 
     def gaits(self, points: np.ndarray) -> list[Gait]:
-        """The gaits of points of shape (n, dimensions)."""
+        """Convert points of shape (n, dimensions) to gaits."""
         lower, width = self._box
         values = lower + folded(np.atleast_2d(points), self.wraps) * width
         return [
@@ -58,14 +58,14 @@ class SearchSpace:
         ]
 
     def slower(self, points: np.ndarray, share: float) -> np.ndarray:
-        """Points (n, dimensions) of the same gaits, the period longer by `share` as far as the space goes."""
+        """Lengthen the period of points (n, dimensions) by the fraction `share`, clipped to the space."""
         number = next(number for number, axis in enumerate(self.axes) if "period_s" in axis.sets)
         axis, slow = self.axes[number], points.copy()
         slow[:, number] += share * (axis.lower / (axis.upper - axis.lower) + points[:, number])
         return folded(slow, self.wraps)
 
     def point(self, gait: Gait) -> np.ndarray:
-        """(dimensions,) of a gait; SpaceError where the gait lies outside or breaks an axis's equality."""
+        """Convert a gait to a point (dimensions,). Raises SpaceError if it is outside or values of one axis differ."""
         values = gait.as_dict()
         for axis in self.axes:
             first, *others = (values[name] for name in axis.sets)
@@ -76,13 +76,13 @@ class SearchSpace:
         return self._unfolded(gait_rows([gait]))[0]
 
     def nearest(self, gaits: Sequence[Gait]) -> np.ndarray:
-        """(n, dimensions) of gaits, or of what the space has nearest to them."""
+        """Convert gaits to the nearest points of the space, (n, dimensions)."""
         return folded(self._unfolded(gait_rows(gaits)), self.wraps)
 
     def retimed(self, points: np.ndarray, longer_s: Mapping[str, float]) -> np.ndarray:
-        """Points (n, dimensions) of the same gaits, some of their `TIMES` longer as far as the space goes: for how long
-        the body is at vacuum and under pressure, by how much, at most half a period, head and tail are ahead of its
-        turn to vacuum, and for how long both ends are at vacuum. What is not longer stays as it is, in seconds.
+        """Lengthen some `TIMES` of points (n, dimensions), clipped to the space. These are how long the body is at
+        vacuum and under pressure, by how much head and tail lead its switch to vacuum (at most half a period), and how
+        long both ends are at vacuum. The other times keep their values in seconds.
         """
         rows = gait_rows(self.gaits(points))
         body_vacuum, body_pressure, head_ahead, tail_ahead, ends_vacuum = (longer_s.get(name, 0.0) for name in TIMES)
@@ -94,20 +94,20 @@ class SearchSpace:
         return folded(self._unfolded(longer), self.wraps)
 
     def _unfolded(self, rows: np.ndarray) -> np.ndarray:
-        """(n, dimensions) of gaits (n, 6), the mean of what an axis sets together."""
+        """Convert gaits (n, 6) to (n, dimensions); parameters that one axis sets together are averaged."""
         means = [rows[:, [GAIT_NAMES.index(name) for name in axis.sets]].mean(axis=1) for axis in self.axes]
         lower, width = self._box
         return (np.stack(means, axis=1) - lower) / width
 
     @property
     def _box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Its lower corner and its widths, (dimensions,) each."""
+        """Lower corner and widths of the box, (dimensions,) each."""
         ends = np.array([(axis.lower, axis.upper) for axis in self.axes])
         return ends[:, 0], ends[:, 1] - ends[:, 0]
 
 
 def folded(points: np.ndarray, wraps: np.ndarray) -> np.ndarray:
-    """Points (n, dimensions) brought back into the unit cube: axes that are full turns wrap, the others are cut."""
+    """Bring points (n, dimensions) back into the unit cube: full turns wrap, other axes are clipped."""
     return np.where(wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))
 
 
@@ -116,7 +116,7 @@ def paper_space(
     duty_body: tuple[float, float] = (0.2, 0.8),
     duty_ends: tuple[float, float] = (0.2, 0.8),
 ) -> SearchSpace:
-    """The box of section V.B; d_2 = d_3 there, as the duty of both ends."""
+    """Return the box of section V.B, in which both ends share one duty, d_2 = d_3."""
     return SearchSpace(
         (
             SearchAxis("period_s", ("period_s",), *period_s, "s"),

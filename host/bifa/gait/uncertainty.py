@@ -1,4 +1,4 @@
-"""What is known of a robot, as draws of the robots that it may be, the same for every gait (common random numbers)."""
+"""What is known of a robot, as draws of possible robots that are the same for every gait (common random numbers)."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from bifa.simulate.plant import of_values, with_curve
 from bifa.simulate.tables import Family, Tabulated
 
 SPREAD = 0.02  # relative standard deviation where the model has no covariance
-_RUNS = Scatter(friction=0.01)  # of a fit that does not say how its runs differ
+_RUNS = Scatter(friction=0.01)  # for a fit without an estimate of how runs differ
 
 
 class UncertaintyError(BifaError):
-    """The spread or the covariance cannot be drawn from; the text says why."""
+    """The spread or the covariance cannot be sampled; the message says why."""
 
 
 @dataclass(frozen=True)
 class Knowledge:
-    """How a robot in its next walk may differ from the model: `names`, and `factor` (n, k) with covariance = factor @
-    factor.T, of its values, those of its curves included; `scatter`: what differs from run to run, and what the model
-    leaves unexplained.
+    """How a robot may differ from the model in its next walk.
 
-    Every draw is a robot in a walk of its own: also of its own are the values that an effect has in each trial, such as
-    a ripple's phase. What is unexplained of pressures lies on both supplies, of forces on what the body's air exerts.
-    `is_guess`: nothing was fitted.
+    names: the uncertain values, those of curves included; their covariance is factor @ factor.T, `factor` (n, k).
+    scatter: what differs from run to run, and what the model leaves unexplained. is_guess: nothing was fitted.
+
+    Every draw is one robot in one walk, so per-trial values of an effect, such as a ripple's phase, are drawn as well.
+    Unexplained pressure is applied to both supplies, unexplained force to the body's pneumatic force.
     """
 
     names: tuple[str, ...]
@@ -47,13 +47,13 @@ class Knowledge:
 
     @property
     def naive(self) -> Knowledge:
-        """The covariance alone, as if the model were true and every run the same."""
+        """The covariance alone, as if the model were exact and all runs alike."""
         return replace(self, scatter=self.scatter.timing, text=f"{self.text.split(';')[0]} alone")
 
     def plants(self, model: Model, count: int, seed: int) -> list[Plant]:
-        """`count` robots, flat. A draw beyond a parameter's bounds is put on the bound.
+        """Draw `count` robots in flat form. Values beyond a parameter's bounds are clipped.
 
-        Drawn as a scrambled Sobol sequence, so that few draws already cover the spread; numbers differ by seed.
+        The draws are a scrambled Sobol sequence seeded with `seed`, so that few of them already cover the spread.
         """
         own, moves = _own_values(model), _MOVES if self.scatter != self.scatter.timing else 0
         ways = self.factor.shape[1]
@@ -75,8 +75,8 @@ class Knowledge:
 
 
 def spread_of(model: Model, relative: float | None = None) -> Knowledge:
-    """From the covariance of the model's fit and its scatter where it has them; otherwise, or where `relative` is
-    given, that relative standard deviation (2 % by default) on each of the base parameters, independently."""
+    """Return what is known of the model: the covariance and scatter of its fit. Without a fit, or if `relative` is
+    given, every base parameter varies independently with that relative standard deviation (2 % by default)."""
     if model.covariance is not None and relative is None:
         sd = np.sqrt(np.maximum(np.diag(model.covariance.matrix), 1e-300))
         values, vectors = np.linalg.eigh(model.covariance.matrix / np.outer(sd, sd))
@@ -85,7 +85,8 @@ def spread_of(model: Model, relative: float | None = None) -> Knowledge:
                 f"the covariance of model {model.name!r} is not positive semidefinite; fit the model again, "
                 "or give a relative spread"
             )
-        # The widest first, which a Sobol sequence covers best; of a curve there are more values than it was fitted by.
+        # Largest first, as a Sobol sequence covers its first dimensions best. The rank is below the number of names
+        # because a curve has more values than fitted parameters.
         kept = np.flatnonzero(values > 1e-12 * values.max())[::-1]
         factor = sd[:, None] * vectors[:, kept] * np.sqrt(values[kept])
         names, scatter = model.covariance.names, model.scatter or _RUNS
@@ -113,7 +114,7 @@ def _words(scatter: Scatter) -> str:
 def _in_a_walk(
     robot: dict[str, float], scatter: Scatter, friction: float, positive: float, negative: float, force: float
 ) -> None:
-    """Move a robot's values by what differs from run to run and what is unexplained: so many standard deviations."""
+    """Shift a robot's values by run-to-run and unexplained differences; the amounts are in standard deviations."""
     for name in ("mu_s", "mu_k"):
         robot[name] *= 1.0 + scatter.friction * friction
     robot["supply_positive_psi"] += scatter.pressure_psi * positive
@@ -122,12 +123,12 @@ def _in_a_walk(
     robot["body_area_N_psi"] *= 1.0 + scatter.force_N * force / push_N
 
 
-_MOVES = 4  # by independent amounts
+_MOVES = 4  # independent amounts of `_in_a_walk`
 _MOVED = ("mu_s", "mu_k", "supply_positive_psi", "supply_negative_psi", "body_area_N_psi")
 
 
 def _own_values(model: Model) -> Mapping[str, tuple[float, float]]:
-    """Where the values lie that an active effect has in every trial: over one period, or between its bounds."""
+    """Ranges of the per-trial values of active effects: one period, or the parameter's bounds."""
     found = {}
     for effect in model.effects:
         for parameter in library()[effect].parameters:
@@ -147,8 +148,8 @@ def _within(model: Model, name: str, value: float) -> float:
 
 
 class _Draws:
-    """Robots that differ from `model` in the values `names`, as its covariance names them, its curves included; some
-    thousands a second, without a model file's checks."""
+    """Robots that differ from `model` in the values `names` (those of its covariance, curves included). Skips the
+    checks of a model file and so makes some thousands a second."""
 
     def __init__(self, model: Model, names: Sequence[str]):
         self._model, self._values = model, model.values
@@ -157,11 +158,11 @@ class _Draws:
         self._curves = {site: _Bent(curve, _members(names, f"{LEARNT}.{site}")) for site, curve in model.learnt.items()}
 
     def plain(self, off: np.ndarray) -> dict[str, float]:
-        """Base and effect parameters by name, `off` (n,) being by how much each of the names differs."""
+        """Base and effect parameters by name; `off` (n,): deviation of each of the names."""
         return {name: self._values[name] + float(off[k]) for k, name in self._plain}
 
     def plant(self, values: Mapping[str, float], off: np.ndarray) -> Plant:
-        """The flat form of the robot that has these of the `values`, and whose curves differ by `off`."""
+        """Flat form of the robot with these `values` and with curves that deviate by `off`."""
         body, small = (spring.at(off) for spring in self._springs)
         flat = of_values(self._values | dict(values), self._model.effects, body, small)
         for site, curve in self._curves.items():
@@ -170,7 +171,7 @@ class _Draws:
 
 
 def _members(names: Sequence[str], owner: str) -> dict[str, int]:
-    """Where the values of a curve are among the names, by what comes after its own."""
+    """Indices in `names` of a curve's values, by the part of the name after the curve's own."""
     return {name.removeprefix(f"{owner}."): k for k, name in enumerate(names) if name.startswith(f"{owner}.")}
 
 
@@ -181,7 +182,7 @@ class _Spring:
         self._family = Family(curve, [StiffnessCurve(tuple(way), curve.lower_m, curve.upper_m) for way in powers])
 
     def at(self, off: np.ndarray) -> Tabulated:
-        """The drawn curve; the model's own in place of one that is not bistable, which no robot has."""
+        """The drawn curve, or the model's own if the drawn one is not bistable, which no real spring is."""
         try:
             return self._family.at(tuple(off[self._places].tolist()))
         except ModelParameterError:
@@ -189,7 +190,7 @@ class _Spring:
 
 
 class _Bent:
-    """A learnt curve that differs at its knots, and between them by the natural cubic spline that it was fitted as."""
+    """A learnt curve that deviates at its knots and, between them, by the natural cubic spline it was fitted as."""
 
     def __init__(self, curve: LearntCurve, members: Mapping[str, int]):
         self._curve, self._rows = curve, []

@@ -1,4 +1,4 @@
-"""The identified model: how well its values are known, where each comes from, and what a diagnosis added to it."""
+"""The identified model with uncertainties, sources of its values, and what a diagnosis added to it."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from lacuna.estimation.uncertainty import Uncertainty, clustered_covariance, unc
 
 
 def completed_model(fit: Fit, date: str = "") -> Model:
-    """The fitted values, effects and a curve learnt in the robot's equations included, with the covariance of what the
-    data determine and with the scatter beyond it, as `bifa simulate` and `bifa optimize` take it. `date`: of the fit,
-    for its provenance."""
+    """Return the fitted model, effects and learnt curves included, with the covariance of the values that the data
+    determine and the scatter beyond it, as used by `bifa simulate` and `bifa optimize`. `date`: of the fit, for the
+    provenance."""
     structure = fit.structure
     model = cast(RobotSystem, structure.system).model_at(fit.theta, structure.effects)
     model = replace(model, learnt=learnt_curves(plant(model), structure.corrections(fit.theta)))
@@ -32,22 +32,22 @@ def completed_model(fit: Fit, date: str = "") -> Model:
 def described(
     model: Model, fit: Fit, known: Uncertainty, command: str, date: str = "", sd: Mapping[str, float] | None = None
 ) -> Model:
-    """`model`, fitted by `fit`, with how well its values are known, how walks differ from it beyond that, and labels.
-    `sd`: standard deviations that come before those of `known`."""
+    """Return `model`, fitted by `fit`, with the uncertainty of its values, the scatter of walks beyond it, and labels.
+    `sd`: standard deviations that override those of `known`."""
     model = replace(_with_uncertainty(model, fit, known, sd or {}), scatter=scatter_of(fit))
     return labeled(model, cast(RobotSystem, fit.structure.system), command, date)
 
 
 def _with_uncertainty(model: Model, fit: Fit, known: Uncertainty, sd: Mapping[str, float]) -> Model:
-    """`model`, fitted by `fit`, with standard deviations and the covariance of all its values that the data determine,
-    the curves' too, correlated as `known`: each by `sd`, else by how well it is known and by what the conditions of the
-    data contradict one another, whichever is more."""
+    """Return `model`, fitted by `fit`, with standard deviations and covariance of all values that the data determine,
+    those of curves included. Correlations are those of `known`; standard deviations are those of `sd`, otherwise the
+    larger of the fit's own and that by which the conditions of the data contradict one another."""
     moves, between = _moves(model, fit), np.sqrt(np.diag(clustered_covariance(fit)))
-    # all knots of a curve: a spline through some of them would swing beyond these
+    # a curve needs all its knots: a spline through some of them would overshoot at the others
     chosen = [k for k, e in enumerate(known.estimates) if (e.determined or is_learnt(e.name)) and e.name in moves]
     if not chosen:
         return model
-    moved = np.where([is_learnt(e.name) for e in known.estimates], 0.0, between)  # knots are within the curve's size
+    moved = np.where([is_learnt(e.name) for e in known.estimates], 0.0, between)  # the curve's size bounds its knots
     widths = {known.estimates[k].name: max(known.estimates[k].sd, float(moved[k])) for k in chosen} | dict(sd)
     fitted = [known.estimates[k].name for k in chosen]
     matrix = known.covariance[np.ix_(chosen, chosen)]
@@ -59,8 +59,8 @@ def _with_uncertainty(model: Model, fit: Fit, known: Uncertainty, sd: Mapping[st
 
 
 def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
-    """For each of the fit's parameters the values of `model` that it moves, and by how much: itself, or those of a
-    curve."""
+    """Map each of the fit's parameters to the values of `model` that it changes (its own, or those of a curve) and the
+    change per unit."""
     structure = fit.structure
     system = cast(RobotSystem, structure.system)
     own = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}
@@ -78,9 +78,9 @@ def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
 
 
 def labeled(model: Model, system: RobotSystem, command: str, date: str = "") -> Model:
-    """`model`, fitted to the data set of `system`, with its name, its provenance and the source of each value.
+    """Return `model`, fitted to the data set of `system`, with a name, its provenance and the source of each value.
 
-    date: of the fit; left out where the same data have to give the same bytes.
+    date: of the fit; left out if the same data have to give the same bytes.
     """
     dataset = system.dataset
     sources = dict.fromkeys(dataset.known, f"[known] of {dataset.name}")

@@ -1,4 +1,4 @@
-"""The whole identification of section IV: where it begins, the joint fit, and what is known afterwards."""
+"""The identification of section IV: starting point, joint fit, and the resulting uncertainty."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from lacuna.estimation.uncertainty import (
     uncertainty,
 )
 
-_NORMAL_HALF = round(NormalDist().inv_cdf(0.5 + CONFIDENCE / 2), 4)  # standard deviations on either side
-# mu_s shows in one sample of a pull, its threshold: there the cost is no parabola.
+_NORMAL_HALF = round(NormalDist().inv_cdf(0.5 + CONFIDENCE / 2), 4)  # half-width in standard deviations
+# mu_s shows in a single sample of each pull, the breakaway, so its cost is not quadratic.
 _PROFILED = "mu_s"
 
 _GIVEN_BY = {
@@ -67,10 +67,10 @@ class Open:
 class Identification:
     """What a data set says about the robot.
 
-    model: the identified model, its covariance included. fit: the joint refinement. uncertainty: of every fitted
-    parameter. intervals: by name, 90 %, those of the profile likelihood where the quadratic ones mislead.
-    statics: the static stage by actuator. open: what could not be determined. error: RMS residual in units of the
-    noise floor, by experiment and channel.
+    model: the identified model, its covariance included. fit: the joint fit. uncertainty: of every fitted parameter.
+    intervals: 90 % intervals by name, from the profile likelihood where the quadratic approximation misleads. statics:
+    the static stage by actuator. open: what could not be determined. error: RMS residual in units of the noise floor,
+    by experiment and channel.
     """
 
     system: RobotSystem
@@ -91,10 +91,10 @@ def identify(
     date: str = "",
     on_progress: Callable[[str], None] = lambda stage: None,
 ) -> Identification:
-    """Identify the robot of `dataset` from `model` (the nominal one) on: what static loadings, rests and sensors say by
-    themselves, then all experiments together. `date`: of the fit, for the model's provenance.
+    """Identify the robot of `dataset`, starting from `model` (default: nominal): first from static loadings, rests and
+    sensors alone, then jointly from all experiments. `date`: of the fit, for the model's provenance.
 
-    Raises UndeterminedError where nothing at all can be fitted. Deterministic.
+    Raises UndeterminedError if nothing at all can be fitted. Deterministic.
     """
     system = prepare(dataset, model, on_progress)
     on_progress("all experiments together, pressures included")
@@ -119,7 +119,7 @@ def identify(
 
 
 def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, IntervalEstimate]:
-    """Quadratic intervals, wider where the experiments contradict one another by more than their noise."""
+    """Quadratic intervals, widened where the experiments contradict one another by more than their noise."""
     spread = np.sqrt(np.diag(clustered_covariance(fit)))
     found = {}
     for estimate, between in zip(known.estimates, spread, strict=True):
@@ -133,8 +133,8 @@ def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, I
 
 
 def _profiles(fit: Fit, intervals: Mapping[str, IntervalEstimate]) -> dict[str, IntervalEstimate]:
-    """A profile-likelihood interval from the pulls alone, the rest of the robot where the joint fit has it; never
-    narrower than the quadratic ones."""
+    """Profile-likelihood interval from the pulls alone, the rest of the robot held at the joint fit; never narrower
+    than the quadratic one."""
     pulls = [trial for trial in fit.problem.trials if trial.experiment == ANCHOR]
     if not pulls or not all(name in intervals for name in PIPE):
         return {}
@@ -147,7 +147,7 @@ def _profiles(fit: Fit, intervals: Mapping[str, IntervalEstimate]) -> dict[str, 
     return {_PROFILED: IntervalEstimate(old.value, max(old.sd, (high - low) / 2.0 / _NORMAL_HALF), low, high)}
 
 
-_SETTLED = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before
+_SETTLED = 0.7  # of the prior's standard deviation: at this ratio half of the information is the prior's
 
 
 def _open(
@@ -158,7 +158,7 @@ def _open(
     intervals: Mapping[str, IntervalEstimate],
 ) -> tuple[Open, ...]:
     prior_sd = {p.name: p.prior_sd for p in system.parameters}
-    # what the data tell hardly more of than was known before is as open as what they do not tell
+    # parameters that the data determine hardly better than the prior count as open
     sd = {e.name: intervals[e.name].sd if e.name in intervals else e.sd for e in known.estimates}
     told = {*dataset.known}
     told |= {e.name for e in known.estimates if e.determined and sd[e.name] <= _SETTLED * (prior_sd[e.name] or np.inf)}

@@ -1,5 +1,4 @@
-"""How walks differ from a fitted model beyond its covariance: from run to run, over a session, and what is
-unexplained."""
+"""How walks differ from a fitted model beyond its covariance: between runs, over a session, and unexplained."""
 
 from __future__ import annotations
 
@@ -17,13 +16,13 @@ from bifa.robot.model import Scatter
 from lacuna.estimation.fit import Fit
 from lacuna.system import Channels, Record
 
-_AS_EXPECTED = 5  # runs that count as having varied by what is expected beforehand
-_SIDE = 0.95  # of a distribution is below the upper end of its 90 % interval
+_AS_EXPECTED = 5  # weight of the prior, in runs that vary as expected beforehand
+_SIDE = 0.95  # quantile at the upper end of a 90 % interval
 _LAST = 50  # samples of a walk, over which its end is averaged
 
 
 def scatter_of(fit: Fit) -> Scatter:
-    """What residuals and the runs' friction show on the trials that were fitted; rounded, since it is an estimate from
+    """Estimate the scatter from residuals and the runs' friction on the fitted trials; rounded, since it is based on
     some tens of runs."""
     found = {
         "friction": _between_runs(fit),
@@ -38,10 +37,10 @@ def scatter_of(fit: Fit) -> Scatter:
 
 
 def session_drifts(fit: Fit) -> dict[str, float]:
-    """RMS over the session of what was learnt to drift, by the scatter that it adds to: the next walk is at a place in
-    another session, which nobody knows."""
+    """RMS over the session of each learnt drift, by the scatter it adds to: the next walk is at an unknown point of
+    another session."""
     learnt = {c.site: float(np.sqrt(np.mean(c.table**2))) for c in fit.structure.corrections(fit.theta)}
-    own = cast(RobotSystem, fit.structure.system).model  # has what is known and so not fitted
+    own = cast(RobotSystem, fit.structure.system).model  # has the values that are known and so not fitted
     area_N_psi, supply_psi = (fit.theta.get(name, own[name]) for name in ("body_area_N_psi", "supply_positive_psi"))
     found = {
         "friction": learnt.get("friction_of_the_day", 0.0),
@@ -52,8 +51,8 @@ def session_drifts(fit: Fit) -> dict[str, float]:
 
 
 def switch_timing(system: RobotSystem) -> Scatter:
-    """The mean timing of the walks' switches: near the edge a quarter of a per cent of the period decides, and a few
-    milliseconds do."""
+    """Mean switch timing of the walks: near the edge a quarter of a per cent of the period, or a few milliseconds,
+    decide."""
     walks = [trial for trial in system.dataset.trials if trial.experiment == WALK]
     if not walks:
         return Scatter()
@@ -66,7 +65,7 @@ def switch_timing(system: RobotSystem) -> Scatter:
 
 
 def _between_runs(fit: Fit) -> float:
-    """Standard deviation of the friction's factor over the runs, together with what was expected of it."""
+    """Standard deviation of the friction factor between runs, combined with its prior."""
     factors = [
         values[k]
         for values, parameters in zip(fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
@@ -78,14 +77,13 @@ def _between_runs(fit: Fit) -> float:
 
 
 def _unexplained(fit: Fit, experiments: Sequence[str], quantity: str) -> float:
-    """RMS of what the repeats of a condition share in their residuals of a quantity, over those of `experiments`."""
+    """RMS of the part of a quantity's residuals that repeats of a condition share, over those of `experiments`."""
     shared = _shared(fit, experiments, lambda _, residual: _joined(residual, quantity))
     return float(np.sqrt(max(float(np.mean(shared)), 0.0))) if shared else 0.0
 
 
 def _shared(fit: Fit, experiments: Sequence[str], part: Callable[[Record, Channels], np.ndarray]) -> list[float]:
-    """What the repeats of each condition of `experiments` share in the `part` of a trial's residuals, where there is
-    one."""
+    """Mean square shared by the repeats of each condition of `experiments`, in the `part` of their residuals if any."""
     residuals = fit.residuals()
     conditions: dict[object, list[np.ndarray]] = {}
     for trial in fit.problem.trials:
@@ -95,7 +93,7 @@ def _shared(fit: Fit, experiments: Sequence[str], part: Callable[[Record, Channe
 
 
 def shared_square(repeats: Sequence[np.ndarray]) -> float:
-    """Mean product of two repeats' residuals: noise averages out of it. Of a single one its mean square."""
+    """Mean product of the residuals of two repeats, free of noise on average; for a single repeat its mean square."""
     length = min(map(len, repeats))
     rows = np.array([values[:length] for values in repeats])
     if len(rows) == 1:
@@ -110,7 +108,7 @@ def _joined(residual: Channels, quantity: str) -> np.ndarray:
 
 
 def _speed(fit: Fit) -> float:
-    """By what share walks end ahead of or behind the model, alike in every repeat."""
+    """Standard deviation of the relative error in the predicted distance of walks, as far as repeats share it."""
 
     def off(walk: Record, residual: Channels) -> np.ndarray:
         way_mm = _end(walk.channels)
@@ -121,8 +119,8 @@ def _speed(fit: Fit) -> float:
 
 
 def of_few(squares: Sequence[float]) -> float:
-    """Standard deviation of which a normal distribution has the same 90 % interval as Student's t, which says how far
-    off the next gait may be: a few tell an RMS badly. 0 of none."""
+    """Standard deviation from a few `squares`: that of the normal distribution with the same 90 % interval as Student's
+    t for the next gait, since few gaits determine an RMS badly. 0 if there are none."""
     if not squares:
         return 0.0
     wider = stdtrit(len(squares), _SIDE) / ndtri(_SIDE)
@@ -130,5 +128,5 @@ def of_few(squares: Sequence[float]) -> float:
 
 
 def _end(channels: Channels) -> float:
-    """Where the head is at the end, mm."""
+    """Position of the head at the end, in mm."""
     return float(np.mean(channels["displacement_head_mm"][-_LAST:]))

@@ -1,8 +1,8 @@
-"""Where identification begins: what static loadings, rests and sensors say by themselves (section IV).
+"""The starting point of identification, from static loadings, rests and sensors alone (section IV).
 
-Static loading gives the stiffness curve K and the area a of each actuator; where an actuator rests in its step
-responses pins K beyond the static range; supplies are read off the sensors. Everything else is found by the fit over
-all experiments, graduated (`lacuna.estimation.graduated`).
+Static loading gives the stiffness curve K and the area a of each actuator; the rest positions in step responses pin K
+beyond the static range; supplies are read off the sensors. Everything else is found by the joint fit over all
+experiments, by continuation (`lacuna.estimation.graduated`).
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from bifa.robot import Model, ModelParameterError
 from lacuna.estimation.solve import one_thread
 
 _ACTUATORS = {"large": "body", "small": "small"}
-_SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that stands for its supply
+_SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that is taken for its supply
 _SETTLED_MM_S = 0.5  # slower than this an actuator is at rest
-_SAMPLES = 20  # that say whether it is
-_PRESSURE_SD_PSI = 0.05  # of a mean reading: a count is 0.037 psi
+_SAMPLES = 20  # from which that is judged
+_PRESSURE_SD_PSI = 0.05  # of a mean reading; one count is 0.037 psi
 
 
 @one_thread
 def prepare(
     dataset: Dataset, model: Model | None = None, on_progress: Callable[[str], None] = lambda stage: None
 ) -> RobotSystem:
-    """A system ready to be fitted to `dataset`: what the lab knows is taken over from it, curves, areas and supplies
-    stand where the static stage leaves them, and the rest is as in `model` (default: nominal), a base model.
+    """Return a system ready to be fitted to `dataset`. Values that the lab knows come from the data set; curves, areas
+    and supplies start from the static stage, everything else from `model` (default: nominal), a base model.
 
-    `on_progress` is told the stage's name. Raises UndeterminedError where the data set holds nothing that can be
-    fitted, ModelParameterError where the model has effects or learnt curves.
+    `on_progress` receives the stage's name. Raises UndeterminedError if nothing in the data set can be fitted,
+    ModelParameterError if the model has effects or learnt curves.
     """
     if not dataset.trials:
         raise UndeterminedError("the data set holds no trials: nothing can be fitted")
@@ -57,25 +57,25 @@ def _refuse_completed(model: Model) -> None:
     tables = [f"[effects.{name}]" for name in model.effects] + [f"[learnt.{name}]" for name in model.learnt]
     if tables:
         raise ModelParameterError(
-            f"model {model.name!r} has {', '.join(tables)}, but a fit starts from a base model: give one without, such "
-            "as the nominal one; `bifa diagnose` finds effects and curves again (with `--suspect EFFECT` it tries one "
-            "that was named before in any case)"
+            f"model {model.name!r} has {', '.join(tables)}, but a fit starts from a base model: give one without them, "
+            "such as the nominal one; `bifa diagnose` finds effects and curves again (with `--suspect EFFECT` it "
+            "always tries one that was named before)"
         )
 
 
 def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
-    """Static fits by actuator, of those that were loaded at 0 psi. A curve without steps beside it continues alone."""
+    """Static fits of the actuators that were loaded at 0 psi, over the range that their step responses reach."""
     found = {}
     for actuator in _ACTUATORS:
         try:
             found[actuator] = fit_static(dataset, actuator, _reach_m(dataset, actuator))
         except UndeterminedError:
-            continue  # the model's own curve stands in; the report says so
+            continue  # the model's own curve is kept, and the report says so
     return found
 
 
 def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model: Model) -> FittedCurve:
-    """The static curve, pinned by where the actuator rested in step responses."""
+    """The static curve, pinned at the actuator's rest positions in step responses."""
     prefix, stiffness = _ACTUATORS[fit.actuator], fit.stiffness
     name = f"{prefix}_area_N_psi"
     area = values.get(name, model[name])
@@ -97,7 +97,7 @@ def _known(dataset: Dataset, model: Model) -> dict[str, float]:
 
 
 def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
-    """Supplies that the lab did not measure, read off the sensors; the joint refinement has the last word."""
+    """Supplies that the lab did not measure, read off the sensors as initial values for the joint fit."""
     found = {}
     vacuum = [psi for actuator in _ACTUATORS for _, psi in _rests(dataset, actuator) if psi < 0]
     if "supply_negative_psi" not in dataset.known and vacuum:
@@ -110,8 +110,8 @@ def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
 
 
 def _rests(dataset: Dataset, actuator: str) -> np.ndarray:
-    """Displacements [m], and the pressures [psi], as they were read, that held the actuator there: under vacuum before
-    the step, and extended before the pressure goes, of every step response; shape (n, 2)."""
+    """Rest positions [m] of every step response, under vacuum before the step and extended before the pressure is
+    released, and the measured pressures [psi] that held the actuator there; shape (n, 2)."""
     found = []
     for trial in dataset.of("step_response", actuator):
         time_s = trial.time_s - trial.time_s[0]
@@ -124,7 +124,7 @@ def _rests(dataset: Dataset, actuator: str) -> np.ndarray:
 
 
 def _reach_m(dataset: Dataset, actuator: str) -> tuple[float, float] | None:
-    """The least and greatest displacement of the actuator's step responses [m], without the noise's outliers."""
+    """Smallest and largest displacement in the actuator's step responses [m], without outliers of the noise."""
     trials = dataset.of("step_response", actuator)
     if not trials:
         return None

@@ -17,7 +17,7 @@ UNPRESSURISED_PSI = 0.05  # below this commanded pressure a trial counts as one 
 
 @dataclass(frozen=True)
 class IntervalEstimate:
-    """`value` with the interval `lower` to `upper` of `CONFIDENCE`; `sd` is its standard deviation."""
+    """`value` with its standard deviation `sd` and its interval `lower` to `upper` at level `CONFIDENCE`."""
 
     value: float
     sd: float
@@ -27,10 +27,10 @@ class IntervalEstimate:
 
 @dataclass(frozen=True)
 class StaticFit:
-    """What static loading tells about one actuator.
+    """Result of static loading for one actuator.
 
-    area_N_psi: None where every trial was at 0 psi.
-    hysteresis_N: half of the mean distance between the loading and the unloading branch at 0 psi.
+    area_N_psi: None if every trial was at 0 psi.
+    hysteresis_N: half the mean distance between the loading and the unloading branch at 0 psi.
     """
 
     actuator: str
@@ -40,17 +40,17 @@ class StaticFit:
 
 
 def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | None = None) -> StaticFit:
-    """K at 0 psi through the middle of the hysteresis, then the area that brings the other pressures onto it.
+    """Fit K at 0 psi through the middle of the hysteresis, then the area that brings the other pressures onto it.
 
-    reach_m: the least and greatest displacement that other experiments reach.
+    reach_m: the smallest and largest displacement in other experiments.
 
-    Raises UndeterminedError without a trial at 0 psi.
+    Raises UndeterminedError if there is no trial at 0 psi.
     """
     trials = dataset.of("static_loading", actuator)
     unloaded = [trial for trial in trials if abs(trial.commanded_psi) < UNPRESSURISED_PSI]
     if not unloaded:
         raise UndeterminedError(
-            f"the stiffness curve of the {actuator} actuator cannot be determined: there is no static_loading of it at "
+            f"the stiffness curve of the {actuator} actuator cannot be determined: it has no static_loading at "
             f"0 psi; run `bifa experiment static_loading --actuator {actuator}`"
         )
     x, force, loading = (np.concatenate(parts) for parts in zip(*map(_branches, unloaded), strict=True))
@@ -61,20 +61,20 @@ def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | N
 
 
 def _branches(trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Displacement [m], force [N], and whether the actuator was being extended; rests take no part."""
+    """Displacement [m], force [N], and whether the actuator was being extended; pauses are left out."""
     motion = imposed_motion(trial.time_s, trial.columns["displacement_mm"] * 1e-3)
     moving = motion.direction != 0
     return motion.displacement_m[moving], trial.columns["force_N"][moving], motion.direction[moving] > 0
 
 
 def _area(stiffness: StiffnessFit, trials: list[Trial]) -> IntervalEstimate:
-    """Each trial gives one area, the mean of (K(x) - F) / p; higher pressures measure it better."""
+    """Each trial gives one area, the mean of (K(x) - F) / p; higher pressures have more weight."""
     areas, weights = [], []
     for trial in trials:
         x, force, _ = _branches(trial)
         areas.append(np.mean(stiffness.force(x) - force) / trial.commanded_psi)
         weights.append(trial.commanded_psi**2)
-    # What is not known of K's mean shifts every trial alike, so the scatter between them does not show it.
+    # The uncertainty of K's mean shifts every trial alike, so it does not show in their scatter.
     x = np.linspace(*stiffness.covered_m, 50)
     mean_pressure = np.average([trial.commanded_psi for trial in trials], weights=weights)
     common_sd = stiffness.mean_force_sd(x) / abs(mean_pressure)
@@ -82,10 +82,10 @@ def _area(stiffness: StiffnessFit, trials: list[Trial]) -> IntervalEstimate:
 
 
 def _weighted_mean(values: np.ndarray, weights: np.ndarray, common_sd: float) -> IntervalEstimate:
-    """The mean of repeated measurements whose variances go as 1/weights, with an interval from their scatter.
+    """Mean of repeated measurements with variances proportional to 1/weights, with an interval from their scatter.
 
-    `common_sd`: what shifts all of them alike and therefore does not show in the scatter. The degrees of freedom are
-    Welch's and Satterthwaite's. A single measurement has an infinite interval: nothing says how well it repeats.
+    `common_sd`: error shared by all of them, which therefore does not show in the scatter. Degrees of freedom by Welch
+    and Satterthwaite. A single measurement has an infinite interval, because its repeatability is unknown.
     """
     mean = float(np.average(values, weights=weights))
     n = len(values)

@@ -1,9 +1,9 @@
-"""The Uno's clock in terms of the host's: offset and drift, with a bound that holds whatever the delays were.
+"""The Uno's clock in terms of the host's: offset and drift, with an error bound that holds whatever the delays were.
 
-Every exchange says that the Uno's time fell between the host's sending and receiving. All exchanges together confine
-the straight line host = offset + rate * uno; the extremes of what is left bound the error. An Uno's ceramic resonator
-is good to 0.5 %. Where no such line exists since one of the clocks has jumped (a host that slept, a process that was
-stopped), what was exchanged before is void: the relation is that of now.
+In every exchange, the Uno reads its clock between the host's sending and receiving. All exchanges together confine the
+straight line host = offset + rate * uno; the extremes of the lines that satisfy them bound the error. An Uno's ceramic
+resonator is accurate to 0.5 %. If no line fits because a clock has jumped (the host slept, or the process was stopped),
+all earlier exchanges are discarded.
 """
 
 from collections import deque
@@ -16,7 +16,7 @@ EXCHANGES_KEPT = 64
 
 @dataclass(frozen=True)
 class HostTime:
-    """A moment on the host's clock, right within +- bound_s."""
+    """A moment on the host's clock, accurate to +- bound_s."""
 
     time_s: float
     bound_s: float
@@ -33,26 +33,26 @@ class ClockRelation:
         return len(self._exchanges)
 
     def add(self, sent_s: float, uno_s: float, received_s: float) -> None:
-        """The Uno read `uno_s` at some moment between the host's `sent_s` and `received_s`."""
+        """Add an exchange: the Uno read `uno_s` at some moment between the host's `sent_s` and `received_s`."""
         if self._exchanges and self._has_jumped(sent_s, uno_s, received_s):
             self._exchanges.clear()
         self._exchanges.append((sent_s, uno_s, received_s))
         self._line = None
 
     def _has_jumped(self, sent_s: float, uno_s: float, received_s: float) -> bool:
-        """Whether between the last exchange and this one either clock has gone otherwise than any resonator lets it."""
+        """Whether the clocks have diverged since the last exchange by more than any resonator's drift explains."""
         last_sent_s, last_uno_s, last_received_s = self._exchanges[-1]
         elapsed_s = uno_s - last_uno_s
         drift_s = LARGEST_DRIFT * abs(elapsed_s)
         return sent_s - last_received_s > elapsed_s + drift_s or received_s - last_sent_s < elapsed_s - drift_s
 
     def to_host(self, uno_s: float) -> HostTime:
-        """When the Uno's clock showed `uno_s`; raises ValueError before the first exchange."""
+        """Return the host time at which the Uno's clock showed `uno_s`; raises ValueError before the first exchange."""
         low, high = self._extremes((1.0, uno_s - self._origin()[0]))
         return HostTime(self._origin()[1] + (low + high) / 2, (high - low) / 2)
 
     def estimate(self, uno_s: float) -> float:
-        """to_host() without the bound, and cheap enough for every sample of a stream."""
+        """Return to_host() without the bound; cheap enough for every sample of a stream."""
         if self._line is None:
             uno_0 = self._origin()[0]
             self._line = (uno_0, self.to_host(uno_0).time_s, 1 + self.drift)
@@ -67,13 +67,13 @@ class ClockRelation:
 
     @property
     def drift(self) -> float:
-        """How much faster the host's clock runs, as a fraction."""
+        """How much faster the host's clock runs than the Uno's, as a fraction."""
         low, high = self._extremes((0.0, 1.0))
         return (low + high) / 2 - 1
 
     @property
     def bound_s(self) -> float:
-        """Bound of the error at the middle of the exchanges."""
+        """Error bound at the middle of the exchanges."""
         return self.to_host(self._origin()[0]).bound_s
 
     def _origin(self) -> tuple[float, float]:
@@ -84,12 +84,12 @@ class ClockRelation:
         return fmean(uno), (fmean(sent) + fmean(received)) / 2
 
     def _extremes(self, objective: tuple[float, float]) -> tuple[float, float]:
-        """Least and greatest objective . (offset, rate) that all exchanges allow, relative to the origin.
+        """Minimum and maximum of objective . (offset, rate) that all exchanges allow, relative to the origin.
 
-        A resonator that warms up bends the line; the exchanges are then widened by as little as makes them agree.
+        A resonator that warms up bends the line; the exchanges are then widened by the least that makes them agree.
         """
         import numpy as np
-        from scipy.optimize import linprog  # takes half a second, and a console needs it never
+        from scipy.optimize import linprog  # takes half a second to import, and a console never needs it
 
         uno_0, host_0 = self._origin()
         sent, uno, received = np.array(self._exchanges).T
@@ -102,5 +102,5 @@ class ClockRelation:
         bounds = [(None, None), rate, (0, slack + 1e-12)]
         low = linprog([*objective, 0], rows, limits, bounds=bounds).fun
         high = -linprog([-objective[0], -objective[1], 0], rows, limits, bounds=bounds).fun
-        disagreement = slack * objective[0]  # as much as the line may be off where the exchanges were widened
+        disagreement = slack * objective[0]  # further error of the line if exchanges were widened
         return low - disagreement, high + disagreement

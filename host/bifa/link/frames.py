@@ -1,4 +1,4 @@
-"""Frames: message number, sequence number, fields, two checks, COBS, between 0x00 bytes (docs/protocol.md)."""
+"""Frames: message number, sequence number, fields and two CRCs, in COBS, between 0x00 bytes (docs/protocol.md)."""
 
 import binascii
 import struct
@@ -13,7 +13,7 @@ _CHECKS = struct.Struct("<HH")
 
 
 def session_seed(key: int) -> int:
-    """The seed of both checks of the messages of a session."""
+    """Return the seed of both CRCs for the messages of a session."""
     return TABLE_HASH ^ key ^ key << 16
 
 
@@ -37,17 +37,17 @@ def crc16_reflected(data: bytes, crc: int) -> int:
 
 
 def checks(message: bytes, seed: int) -> bytes:
-    """The four bytes that follow a message: CRC-16 by 0x1021 and by 0x8005, seeded with the halves of `seed`."""
+    """Return the four bytes that follow a message: CRC-16 by 0x1021 and 0x8005, seeded with the halves of `seed`."""
     return _CHECKS.pack(binascii.crc_hqx(message, seed & 0xFFFF), crc16_reflected(message, seed >> 16))
 
 
 def cobs_encode(data: bytes) -> bytes:
-    """`data` (shorter than 254 bytes) without any 0x00."""
+    """Encode `data` (shorter than 254 bytes) so that it contains no 0x00."""
     return b"".join(bytes([len(run) + 1]) + run for run in data.split(b"\0"))
 
 
 def cobs_decode(data: bytes) -> bytes | None:
-    """The inverse of cobs_encode; None if `data` is not the code of anything."""
+    """Invert cobs_encode; None if `data` is not a valid encoding."""
     runs, at = [], 0
     while at < len(data):
         code = data[at]
@@ -60,9 +60,9 @@ def cobs_decode(data: bytes) -> bytes | None:
 
 
 def mask(code: bytes) -> bytes:
-    """`code` under the least mask that leaves neither 0x00 nor `!` in it, with the mask in front.
+    """XOR `code` with the smallest mask that leaves neither 0x00 nor `!` in it, and prepend the mask.
 
-    So what a bad line leaves of a frame is never taken for a stop.
+    Thus no fragment of a frame from a bad line is ever taken for a stop.
     """
     present = set(code)
     least = next(m for m in range(1, 256) if m != ord("!") and m not in present and m ^ ord("!") not in present)
@@ -70,19 +70,19 @@ def mask(code: bytes) -> bytes:
 
 
 def encode(message: Message, sequence: int, values: tuple[Any, ...], seed: int) -> bytes:
-    """A message as it goes to the Uno. The doubled first delimiter ends what may hang open at the receiver."""
+    """Encode a message for the Uno. The doubled first delimiter ends any unfinished input at the receiver."""
     body = bytes([message.number, sequence]) + struct.pack(message.layout, *values)
     return b"\0\0" + mask(cobs_encode(body + checks(body, seed))) + b"\0"
 
 
 def encode_name(name: str) -> bytes:
-    """A preset's name as a field."""
+    """Encode a preset's name as a field."""
     return name.encode().ljust(NAME_BYTES, b"\0")
 
 
 STOP_FRAME = encode(COMMANDS["stop_now"], 0, (), OPEN_SEED)
-# A whole stop frame is acted on in whatever state the receiver is, since two delimiters lead it. So one of two acts,
-# whichever byte the line damages, loses or invents.
+# An intact stop frame takes effect whatever the receiver's state, because two delimiters precede it. So one of the two
+# takes effect, whichever byte the line damages, loses or inserts.
 STOP = (STOP_FRAME + b"!") * 2
 
 _REPORTS_BY_NUMBER = {report.number: report for report in REPORTS.values()}
@@ -101,9 +101,9 @@ class Report:
 
 
 def decode(frame: bytes, session: int) -> Report | None:
-    """The report in a frame (without delimiters); None unless number, exact length and both checks are right.
+    """Decode the report in a frame (without delimiters); None unless number, exact length and both CRCs are right.
 
-    `session` is the seed of session messages.
+    `session`: seed of the CRCs of session messages.
     """
     body = cobs_decode(frame)
     if body is None or len(body) < 2 + _CHECKS.size or body[0] not in _REPORTS_BY_NUMBER:
@@ -128,7 +128,7 @@ def unpack(message: Message, data: bytes) -> dict[str, Any]:
 
 
 class Splitter:
-    """Parts what comes from the Uno into lines of text and frames."""
+    """Splits the Uno's output into lines of text and frames."""
 
     LONGEST_FRAME = 64
     LONGEST_LINE = 256
@@ -139,10 +139,10 @@ class Splitter:
         self._line = bytearray()
 
     def feed(self, data: bytes) -> list[tuple[str, bytes]]:
-        """("line", text without its end) and ("frame", bytes between the delimiters), in order of arrival.
+        """Return ("line", text without its end) and ("frame", bytes between the delimiters), in order of arrival.
 
-        An overlong line comes out in pieces. An overlong frame comes out as ("frame", what there was): it will not
-        decode, and so is counted.
+        An overlong line is returned in pieces. The received part of an overlong frame is returned as a frame: it
+        does not decode, and so is counted as bad.
         """
         parts: list[tuple[str, bytes]] = []
         for byte in data:

@@ -1,11 +1,11 @@
-"""Leaving: however a command ends, the robot stands still before the port closes.
+"""Leaving: however a command ends, the robot is stopped before the port closes.
 
-Whoever talks to an Uno does so inside `with Uno(...)`, and that is all: its end stops the robot, repeats the stop
-until the Uno says that no valve is on, and raises StillMovingError if it does not say so. Ctrl-C, Ctrl-\\, `kill` and a
-closed terminal end what is inside like any exception, wherever it is; their stop leaves before anything else is tidied
-up, and once a robot is being stopped nothing interrupts that. Ctrl-Z stops the robot before it suspends the program,
-which ends when it is resumed. On Linux the end of the program that started this one, which by itself sends no signal
-(SIGKILL of a script, for instance), ends it as well, but for `nohup`, which asks for the opposite.
+All code that talks to an Uno runs inside `with Uno(...)`. The end of that block stops the robot, repeats the stop
+until the Uno reports that no valve is on, and raises StillMovingError if that report does not come. Ctrl-C, Ctrl-\\,
+`kill` and a closed terminal end the block like an exception, wherever it is; the stop is sent before any clean-up, and
+nothing interrupts a stop under way. Ctrl-Z stops the robot, then suspends the program, which ends when it is resumed.
+On Linux, the end of the parent process, which by itself sends no signal (SIGKILL of a script, for instance), ends the
+program as well, unless it runs under `nohup`.
 """
 
 import contextlib
@@ -28,12 +28,12 @@ Given = ParamSpec("Given")
 Result = TypeVar("Result")
 
 CONFIRMED_WITHIN_S = 5.0
-FIRST_ATTEMPT_S = 0.25  # the next one waits twice as long: the computer may be slow rather than the cable bad
+FIRST_ATTEMPT_S = 0.25  # doubled at each further attempt: the computer may be slow rather than the cable bad
 STANDING = (STATES.index("stopped"), STATES.index("fault"))
 
 
 class Mover(Protocol):
-    """What can be stopped from a signal handler."""
+    """A robot that can be stopped from a signal handler."""
 
     def send_stop(self) -> None:
         """Send the stop, without waiting for anything."""
@@ -44,19 +44,19 @@ _earlier_handlers: dict[int, Any] = {}
 _earlier_hook: list[Callable[..., Any]] = []
 _held: list[int] = []
 _again: list[threading.Timer] = []
-_parents: list[int] = []  # who started this program, while their death ends it
-_whole: set[CodeType] = set()  # code of the functions that nothing interrupts
+_parents: list[int] = []  # the parent's process id, while its death ends this program
+_whole: set[CodeType] = set()  # code of the functions that must not be interrupted
 AGAIN_AFTER_S = 0.01
 _SET_DEATH_SIGNAL, _GET_DEATH_SIGNAL = 1, 2  # PR_SET_PDEATHSIG, PR_GET_PDEATHSIG of prctl(2)
-_DEATH: Any = getattr(signal, "SIGUSR2", None)  # a signal of its own: it also comes when the parent's thread alone ends
+_DEATH: Any = getattr(signal, "SIGUSR2", None)  # a separate signal: it also comes if only a thread of the parent ends
 
 
 def enter(robot: Mover) -> None:
-    """From now on, until `leave`, signals that end a program, or suspend it, stop `robot` at once and raise
+    """From now on, until `leave`, signals that end or suspend a program stop `robot` at once and raise
     KeyboardInterrupt.
 
-    What the program or `nohup` has decided otherwise is left alone, and so is everything in other threads than the main
-    one, which get no signals.
+    Signals that the program or `nohup` already handles differently are left alone. Outside the main thread, the only
+    one that receives signals, no handlers are installed.
     """
     if not _inside and threading.current_thread() is threading.main_thread():
         for name, act in _ACTS.items():
@@ -70,7 +70,7 @@ def enter(robot: Mover) -> None:
 
 
 def leave(robot: Mover) -> None:
-    """`robot` has been stopped; signals mean again what they meant before."""
+    """Restore the earlier signal handlers; `robot` has been stopped."""
     _inside.remove(robot)
     if not _inside and threading.current_thread() is threading.main_thread():
         _watch_parent_no_more()
@@ -83,8 +83,8 @@ def leave(robot: Mover) -> None:
 
 
 def uninterrupted(function: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Decorates what must come to its end: a signal meanwhile raises KeyboardInterrupt only after it. If that end is an
-    error, it is raised from the KeyboardInterrupt, so that nobody tries again."""
+    """Decorate a function that must run to its end: a signal during it raises KeyboardInterrupt only afterwards. If the
+    function fails, its error is raised from a KeyboardInterrupt, so that the caller does not retry."""
 
     def whole(*args: Given.args, **kwargs: Given.kwargs) -> Result:
         try:
@@ -111,7 +111,7 @@ def _end(number: int, frame: FrameType | None) -> None:
         frame = frame.f_back
     _held.clear()
     _cancel_again()
-    # First of all: what lies between here and the end of the command may take long, or write to a pipe that is full.
+    # Stop first: unwinding to the end of the command may take long, or block on a full pipe.
     _stop_all()
     raise KeyboardInterrupt
 
@@ -132,7 +132,7 @@ _ACTS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGB
 
 
 def _orphaned(number: int, frame: FrameType | None) -> None:
-    if os.getppid() != _parents[-1]:  # else only the thread that started this program has ended
+    if os.getppid() != _parents[-1]:  # otherwise only the parent's thread has ended
         _end(number, frame)
 
 
@@ -154,7 +154,7 @@ def _watch_parent_no_more() -> None:
 
 
 def death_signal() -> int | None:
-    """What the parent's death sends to this process now, 0: nothing; None where that cannot be chosen."""
+    """Signal that this process gets when its parent dies, 0 for none; None where the system has no such setting."""
     now = ctypes.c_int()
     return now.value if _prctl(_GET_DEATH_SIGNAL, ctypes.byref(now)) == 0 else None
 
@@ -172,7 +172,7 @@ def _cancel_again() -> None:
 
 
 def _end_again(lost: "sys.UnraisableHookArgs") -> None:
-    """Python drops what is raised while it clears up (`__del__`, a generator's end): raise it once more."""
+    """Raise a KeyboardInterrupt again that Python dropped, as it does in clean-up (`__del__`, a generator's end)."""
     if lost.exc_type is KeyboardInterrupt:
         _again.append(threading.Timer(AGAIN_AFTER_S, signal.raise_signal, [signal.SIGINT]))
         _again[-1].start()
@@ -181,7 +181,7 @@ def _end_again(lost: "sys.UnraisableHookArgs") -> None:
 
 
 def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> None:
-    """Send the stop until the status that `ask(timeout_s)` gets shows that no valve is on.
+    """Send the stop repeatedly until the status returned by `ask(timeout_s)` shows that no valve is on.
 
     Raises NoAnswerError after CONFIRMED_WITHIN_S, and a ConnectionError if the port is gone.
     """
@@ -201,15 +201,14 @@ def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> No
 
 
 def stop_in_new_session(session: Session) -> None:
-    """stop_until_confirmed() in a session of its own: it waits for nothing of an interrupted one, and resends
-    nothing."""
+    """Call stop_until_confirmed() in a new session, which neither awaits nor resends anything of an interrupted one."""
     new = session.successor()
 
     def ask(attempt_s: float) -> Report:
         try:
             new.connect(attempt_s)
             return new.call("status", timeout_s=attempt_s)
-        except RestartedError as error:  # it greets once more
+        except RestartedError as error:  # the Uno has greeted again
             raise NoAnswerError(str(error)) from None
 
     stop_until_confirmed(new, ask)

@@ -1,8 +1,8 @@
-"""A session with the Uno: commands arrive once and in order, or the caller is told that they did not.
+"""A session with the Uno: commands arrive once and in order, or the caller gets an error.
 
-Commands are numbered and up to four are under way at once. The Uno carries out the one it expects, answers repeats from
-memory and names the number it waits for when one is missing; what stays unanswered is sent again, in order (go-back-N).
-Telemetry and lines of text arrive in between; they are handed on as they come.
+Commands are numbered, and up to four are in flight at once. The Uno carries out the one it expects, answers repeats
+from memory, and names the number that it waits for if one is missing; unanswered commands are sent again, in order
+(go-back-N). Telemetry and lines of text that arrive in between are passed on as they come.
 """
 
 import random
@@ -22,23 +22,23 @@ WINDOW = 4
 RESEND_AFTER_S = 0.03
 PROBE_AFTER_S = 0.5  # without progress: ask whether the Uno is still the same
 GREET_EVERY_S = 0.1
-ANSWERS = {  # of the commands that ask for something; the others are answered by `done`, and so is what is refused
+ANSWERS = {  # reports that answer queries; all other commands, and refused ones, are answered by `done`
     "status": "status_report",
     "read_set": "set_report",
     "presets": "preset_report",
     "read_clock": "clock_report",
 }
-LEAST_WAIT_S = 1e-4  # so that time goes on, however finely a clock counts
+LEAST_WAIT_S = 1e-4  # so that time advances, however fine the clock's resolution
 
 
 def word(words: Sequence[str], number: int) -> str:
-    """The word for `number`; a number that another version of the firmware may use is shown as it is."""
+    """Return the word for `number`; a number that only another version of the firmware knows is shown as a number."""
     return words[number] if number < len(words) else f"unknown ({number})"
 
 
 @dataclass
 class Counters:
-    """What the link has been through; everything but `frames` should stay near zero on a good cable."""
+    """Counts of the link's traffic; all but `frames` and `samples` should stay near zero on a good cable."""
 
     frames: int = 0
     bad: int = 0
@@ -47,17 +47,17 @@ class Counters:
     lost: int = 0
 
     def since(self, before: "Counters") -> "Counters":
-        """What has come in addition."""
+        """Return the increase of each count since `before`."""
         return Counters(**{one.name: getattr(self, one.name) - getattr(before, one.name) for one in fields(self)})
 
     def text(self) -> str:
-        """The counters, as people see them everywhere."""
+        """The counts as one line, worded the same in every display."""
         return f"samples {self.samples}  lost {self.lost}  bad frames {self.bad}  sent again {self.resent}"
 
 
 @dataclass(frozen=True)
 class Hello:
-    """Who the Uno says it is."""
+    """The Uno's greeting: versions, reason of the last start, and session."""
 
     firmware: str
     protocol: int
@@ -68,7 +68,7 @@ class Hello:
 
     @classmethod
     def of(cls, report: frames.Report) -> "Hello":
-        """Read a hello message."""
+        """Convert a hello report."""
         return cls(
             ".".join(map(str, report["firmware"])),
             report["protocol"],
@@ -91,7 +91,7 @@ class _Request:
 
 @dataclass(frozen=True)
 class Answer:
-    """The report that answered a command, and the host's times between which it was carried out."""
+    """The report that answered a command, and the host times between which the command was carried out."""
 
     report: frames.Report
     sent_s: float
@@ -102,7 +102,7 @@ class Session:
     """Commands and answers over a transport; time passes only while a method waits."""
 
     def __init__(self, transport: Transport, clock: Clock, seed: int | None = None) -> None:
-        """`seed` makes the keys of sessions repeatable."""
+        """`seed` makes session keys reproducible."""
         self.transport = transport
         self.clock = clock
         self.counters = Counters()
@@ -117,25 +117,25 @@ class Session:
         self._outstanding: deque[_Request] = deque()
         self._hellos: deque[Hello] = deque(maxlen=8)
         self._go_back = False
-        self._is_calling = False  # also after a call that never came to its end
+        self._is_calling = False  # stays True after a call that did not finish
         self._is_abandoned = False
 
     def successor(self) -> "Session":
-        """Another session on the same line, which knows nothing of what this one has under way; not yet connected."""
+        """Return a new, unconnected session on the same line, unaware of this one's commands in flight."""
         return Session(self.transport, self.clock, self._random.getrandbits(32))
 
     def send_stop(self) -> None:
-        """The real-time stop; says nothing about its success, and may be called from any thread at any moment."""
+        """Send the real-time stop without waiting for its confirmation; callable from any thread at any moment."""
         self.transport.write(frames.STOP)
 
     def abandon(self) -> None:
-        """Whatever thread waits in this session gets an AbandonedError; there is no way back."""
+        """Raise AbandonedError in any thread that waits in this session; this cannot be undone."""
         self._is_abandoned = True
 
     def connect(self, timeout_s: float = 5.0) -> Hello:
-        """Wait for the Uno and open a session; anything of an earlier one is void.
+        """Wait for the Uno and open a session; commands of an earlier one are void.
 
-        Raises MismatchError when the image is another version, NoAnswerError when nothing answers.
+        Raises MismatchError if the firmware has another version, NoAnswerError if nothing answers.
         """
         deadline = self.clock.now() + timeout_s
         self.key = 0
@@ -144,10 +144,10 @@ class Session:
             raise MismatchError(
                 f"the Uno runs firmware {hello.firmware} (protocol {hello.protocol}, table {hello.table_hash:08x}), "
                 f"this is bifa {__version__} (protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}); "
-                "bring the Uno up to date with: bifa flash"
+                "update the Uno with: bifa flash"
             )
-        # One key for all attempts: a hello that was already under way answers an earlier one. Not that of a session
-        # which is there: it would not be opened anew.
+        # One key for all attempts, since a hello in flight may answer an earlier one; but not the key of a session that
+        # the Uno already has, which it would not open again.
         key = hello.session_key
         while key == hello.session_key:
             key = self._random.randrange(1, 0x10000)
@@ -161,15 +161,15 @@ class Session:
         return hello
 
     def _renew(self, timeout_s: float) -> None:
-        """A new session with the same Uno, so that what an interrupted call has under way is neither taken for the
-        answer to another nor carried out later."""
+        """Open a new session with the same Uno, so that what an interrupted call left in flight is neither mistaken for
+        another call's answer nor carried out later."""
         nonce = self.hello.boot_nonce if self.hello else None
         if self.connect(timeout_s).boot_nonce != nonce:
             raise RestartedError("the Uno restarted; connect again and repeat")
         self.on_renewed()
 
     def _greet(self, name: str, values: tuple[Any, ...], deadline: float) -> Hello:
-        """Send an open message again and again until a hello comes."""
+        """Send an open message repeatedly until a hello arrives."""
         message = frames.encode(COMMANDS[name], 0, values, frames.OPEN_SEED)
         self._hellos.clear()
         while self.clock.now() < deadline:
@@ -184,9 +184,9 @@ class Session:
         )
 
     def poll(self, timeout_s: float = 0.0) -> None:
-        """Take in what has arrived, waiting at most `timeout_s` for something."""
+        """Process what has arrived, waiting at most `timeout_s` for something to arrive."""
         if self._is_abandoned:
-            raise AbandonedError("the session has been ended from outside")
+            raise AbandonedError("another thread ended the session")
         data = self.transport.read(max(timeout_s, LEAST_WAIT_S) if timeout_s > 0 else 0.0)
         now = self.clock.now()
         for kind, content in self._splitter.feed(data):
@@ -201,7 +201,7 @@ class Session:
             self.take(report, now)
 
     def take(self, report: frames.Report, now: float) -> None:
-        """A report that has arrived: a sample, a greeting, or the answer to a request."""
+        """Process a report that arrived at `now`: a sample, a greeting, or the answer to a request."""
         if report.name == "sample":
             self.on_sample(report)
         elif report.name == "hello":
@@ -213,7 +213,7 @@ class Session:
             self._take_answer(report, now)
 
     def _take_answer(self, report: frames.Report, now: float) -> None:
-        """What answers a command with another's report, or ends one whose report is missing, is no answer to it."""
+        """Store an answer with its request. Another command's report, or `done` in place of a report, counts as bad."""
         for request in self._outstanding:
             if request.sequence == report.sequence and request.answer is None:
                 if report.name == ANSWERS.get(request.name, "done") or (report.name == "done" and report["result"]):
@@ -222,15 +222,14 @@ class Session:
                     self.counters.bad += 1
 
     def call(self, name: str, *values: Any, timeout_s: float = 5.0) -> frames.Report:
-        """Carry out one command; raises RefusedError, NoAnswerError or RestartedError."""
+        """Carry out one command and return its report; raises RefusedError, NoAnswerError or RestartedError."""
         return self.call_all([(name, values)], timeout_s)[0].report
 
     def call_all(self, commands: Sequence[tuple[str, tuple[Any, ...]]], timeout_s: float = 5.0) -> list[Answer]:
-        """Carry out commands in order, several under way at once.
+        """Carry out commands in order, several in flight at once.
 
-        `timeout_s` is the longest time without any progress. The first command that is refused raises RefusedError;
-        the ones after it may have been carried out. After a call that was interrupted, or not answered, the next one
-        begins with a new session.
+        `timeout_s` is the longest time without progress. The first refused command raises RefusedError; those after it
+        may have been carried out. After a call that was interrupted or not answered, the next call opens a new session.
         """
         if self._is_calling:
             self._renew(timeout_s)
@@ -258,7 +257,7 @@ class Session:
                 probe_s = progress_s + PROBE_AFTER_S
                 if answer.report.name == "done" and answer.report["result"] != 0 and refused is None:
                     refused = RefusedError(request.name, answer.report["result"])
-                    queue.clear()  # what is under way already is still carried out
+                    queue.clear()  # commands already in flight are still carried out
             self.raise_if_restarted()
             if self.clock.now() > probe_s:
                 self.transport.write(frames.encode(COMMANDS["version"], 0, (), frames.OPEN_SEED))
@@ -274,7 +273,7 @@ class Session:
         return answers
 
     def _send_due(self, queue: deque[Any]) -> None:
-        """Send new commands while the window has room, and the unanswered ones again when they are due."""
+        """Send new commands while the window has room, and resend unanswered ones when they are due."""
         now = self.clock.now()
         if self._outstanding and self._outstanding[0].answer is None:
             oldest_s = self._outstanding[0].sent_s
@@ -296,7 +295,7 @@ class Session:
         self.transport.write(request.data)
 
     def raise_if_restarted(self) -> None:
-        """RestartedError if the Uno has greeted, and not for this session."""
+        """Raise RestartedError if the Uno has sent a greeting that is not of this session."""
         while self._hellos:
             hello = self._hellos.popleft()
             if hello.session_key != self.key:

@@ -31,13 +31,13 @@ TABLE_HASH = 0x6908B694
 NAME_BYTES = 12
 
 # the firmware's own numbers
-DEAD_TIME_MS = 3  # for how long both valves of a chamber stay off when one follows the other: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms
-SAMPLE_PERIOD_MS = 10  # from one strobe and sample of the pressures to the next
-MARK_PAUSE = 10  # strobes that a mark leaves out
-SCHEDULE_ENTRIES = 16  # timed holds that fit
-SESSION_TIMEOUT_MS = 2000  # of silence in a session, after which air is vented where host_timeout_s is 0: the host may have been killed
-CONVERTER_COUNTS = 4096  # of the MCP4725, 12 bits
-REGULATOR_SPAN_MPSI = 130000  # full scale of the SMC ITV1050 (0.9 MPa at 5 V): on the converter it would burst pouches and sensors
+DEAD_TIME_MS = 3  # time for which both valves of a chamber stay off between two states: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms
+SAMPLE_PERIOD_MS = 10  # interval between pressure samples and their strobes
+MARK_PAUSE = 10  # number of strobes left out as a mark
+SCHEDULE_ENTRIES = 16  # capacity for timed holds
+SESSION_TIMEOUT_MS = 2000  # silence in a session after which air is vented if host_timeout_s is 0: the host may have been killed
+CONVERTER_COUNTS = 4096  # resolution of the MCP4725, 12 bits
+REGULATOR_SPAN_MPSI = 130000  # full scale of the SMC ITV1050 (0.9 MPa at 5 V), which would burst pouches and sensors
 
 PARAMETERS = (
     UnoParameter('period_s', 's', 6, 500000, 60000000, 5700000,

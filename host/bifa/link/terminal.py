@@ -1,4 +1,4 @@
-"""Console lines over the port of a session: text out, text back, telemetry and clock beside them."""
+"""Console lines over the port of a session, which carries telemetry and clock exchanges at the same time."""
 
 from bifa.link.errors import NoAnswerError
 from bifa.link.transport import Clock
@@ -7,16 +7,16 @@ from bifa.link.uno import Uno
 SETTLE_S = 0.05
 LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
 MOVING = ("run", "hold")
-REPLACING = ("set", "load", "defaults")  # `host_timeout_s`, maybe
+REPLACING = ("set", "load", "defaults")  # these may change `host_timeout_s`
 
 
 def is_answer(line: str) -> bool:
-    """Whether a line ends the answer to what was typed."""
+    """Whether a line ends the answer to a typed line."""
     return line.startswith(("ok", "error"))
 
 
 def settle(uno: Uno, clock: Clock) -> None:
-    """End whatever is unfinished in the Uno's input line, and drop its answer to that."""
+    """End any unfinished line in the Uno's input, and drop the answer to it."""
     uno.session.transport.write(b"\n")
     deadline = clock.now() + SETTLE_S
     while clock.now() < deadline:
@@ -25,15 +25,15 @@ def settle(uno: Uno, clock: Clock) -> None:
 
 
 def _drop_answers(uno: Uno) -> None:
-    """Drop answers that nobody waits for any more; what the Uno said by itself stays."""
+    """Drop answers that are no longer awaited, but keep unsolicited lines."""
     lines = [line for line in uno.session.lines if not is_answer(line)]
     uno.session.lines.clear()
     uno.session.lines.extend(lines)
 
 
 def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
-    """Send one console line; returns the lines up to its answer, that included, behind those that came unasked.
-    Frames go on meanwhile. A line with characters that are no text is answered with an error here.
+    """Send one console line; return any unsolicited lines, then those up to and including its answer. Frames continue
+    meanwhile. A line with characters that are not text is not sent, and gets an error as its answer.
 
     Raises NoAnswerError, and RestartedError if the Uno restarts meanwhile.
     """
@@ -44,7 +44,7 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
         uno.may_move = True
     lines = _answered(uno, line, clock)
     if word in REPLACING:
-        uno.parameters()  # which tells how often the Uno wants to be talked to
+        uno.parameters()  # reads `host_timeout_s`, and with it how often to keep the link alive
     return lines
 
 

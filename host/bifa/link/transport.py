@@ -1,5 +1,5 @@
-"""The bytes between host and Uno, wherever they flow, and the clock beside them: a serial port and the computer's time,
-or a virtual Uno in virtual time."""
+"""The byte stream between host and Uno, and the clock that belongs to it: a serial port with the computer's time, or a
+virtual Uno with virtual time."""
 
 import time
 from typing import Protocol
@@ -18,10 +18,10 @@ class Transport(Protocol):
         """Send all of `data`."""
 
     def read(self, timeout_s: float) -> bytes:
-        """Whatever has arrived, waiting at most `timeout_s` for the first byte; b"" on time-out."""
+        """Return whatever has arrived, waiting at most `timeout_s` for the first byte; b"" on time-out."""
 
     def close(self) -> None:
-        """Let go of the port once what was written has left, as far as it goes; a second call does nothing."""
+        """Close the port after sending what was written, as far as possible; a second call does nothing."""
 
 
 class Clock(Protocol):

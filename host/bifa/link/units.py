@@ -1,4 +1,4 @@
-"""Parameters between people's decimal units and the integers of the wire."""
+"""Conversion of parameters between decimal units and the integers sent on the wire."""
 
 import math
 import struct
@@ -12,7 +12,7 @@ BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
 
 
 class UnoParameterError(BifaError):
-    """A parameter that does not exist or whose value lies out of its range."""
+    """A parameter does not exist, or its value is out of range."""
 
 
 def _parameter(name: str) -> UnoParameter:
@@ -23,15 +23,15 @@ def _parameter(name: str) -> UnoParameter:
 
 
 def range_text(parameter: UnoParameter) -> str:
-    """ "0.5 to 60 s" """
+    """Return the range of a parameter in words, such as "0.5 to 60 s"."""
     low, high = (from_wire(parameter.name, bound) for bound in (parameter.minimum, parameter.maximum))
     return f"{low:g} to {high:g} {parameter.unit}".rstrip()
 
 
 def to_wire(name: str, value: float) -> int:
-    """The integer that stands for `value` (in the unit of the name), rounded half up as the Uno rounds.
+    """Return the integer that encodes `value` (in the unit that the name ends in), rounded half up as on the Uno.
 
-    Raises UnoParameterError, which names the range, for an unknown name, NaN, infinity and values out of range.
+    Raises UnoParameterError, which states the range, for an unknown name, NaN, infinity and values out of range.
     """
     parameter = _parameter(name)
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
@@ -43,27 +43,27 @@ def to_wire(name: str, value: float) -> int:
 
 
 def from_wire(name: str, value: int) -> float:
-    """The value in the unit of the name."""
+    """Return the value that an integer encodes, in the unit that the name ends in."""
     return float(Decimal(value).scaleb(-_parameter(name).decimals))
 
 
 def set_point_psi(pressure_psi: float) -> float:
-    """What the regulator is asked for where `pressure_psi` is: whole counts of the converter, rounded down
+    """Set point sent to the regulator for `pressure_psi`: whole counts of the converter, rounded down
     (lib/pressure/supply.h)."""
     counts = int(round(pressure_psi * 1e3) * CONVERTER_COUNTS // REGULATOR_SPAN_MPSI)
     return counts * REGULATOR_SPAN_MPSI / CONVERTER_COUNTS * 1e-3
 
 
 def index_of(name: str) -> int:
-    """The number of a parameter on the wire."""
+    """Return the number of a parameter on the wire."""
     return PARAMETERS.index(_parameter(name))
 
 
 def unpack_set(data: bytes) -> dict[str, int]:
-    """A parameter set from its bytes, in wire units."""
+    """Decode the bytes of a parameter set, to wire units."""
     return dict(zip(BY_NAME, struct.unpack(SET_FORMAT, data), strict=True))
 
 
 def pack_set(values: Mapping[str, int]) -> bytes:
-    """The bytes of a parameter set in wire units."""
+    """Encode a parameter set given in wire units."""
     return struct.pack(SET_FORMAT, *(values[name] for name in BY_NAME))

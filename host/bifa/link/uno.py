@@ -1,4 +1,4 @@
-"""The Uno as the rest of the host uses it: parameters, walking, holding, telemetry."""
+"""The Uno as an object: parameters, walking, holding, telemetry."""
 
 import binascii
 import math
@@ -25,23 +25,23 @@ from bifa.link.units import UnoParameterError, from_wire, index_of, pack_set, to
 
 EEPROM_TIMEOUT_S = 10.0
 CLOCK_EVERY_S = 1.0
-CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
+CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds, so the true time may be later by this
 EXCHANGES_AT_START = 5
-PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means about so long after its strobe (docs/firmware.md)
+PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means around this time after its strobe (docs/firmware.md)
 SAMPLE_US = 1000 * SAMPLE_PERIOD_MS
-DEAD_TIME_S = 1e-3 * (DEAD_TIME_MS + 1)  # from one supply to the other a chamber vents, and waits for the tick
-CONNECTIONS = ("off", "positive", "vacuum", "both")  # by the two valves of a chamber
+DEAD_TIME_S = 1e-3 * (DEAD_TIME_MS + 1)  # venting between the two supplies, including the wait for the tick
+CONNECTIONS = ("off", "positive", "vacuum", "both")  # indexed by the bits of a chamber's two valves
 LATEST_HOLD_S = (2**32 - 1) / 1000
 _WRAP_US = 1 << 32
-_OLDEST_US = 10_000_000  # by which a sample may be older than what came before it
+_OLDEST_US = 10_000_000  # by how much a sample may be older than the previous one
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One line of telemetry; tuples are body, head, tail."""
+    """One sample of telemetry; tuples are body, head, tail."""
 
-    sequence: int  # counts all samples, lost ones too
-    time_us: int  # the Uno's clock when the pressures were sampled, since its start
+    sequence: int  # counts all samples, including lost ones
+    time_us: int  # time since the Uno's start, by its clock, when the pressures were sampled
     state: str
     pressure_psi: tuple[float, float, float]
     command: tuple[float, float, float]  # 1 positive, 0 vacuum, NaN off
@@ -50,14 +50,14 @@ class Sample:
 
     @property
     def connected(self) -> tuple[str, str, str]:
-        """What the valves connect each chamber to: "positive", "vacuum", "off" or, which must never be, "both"."""
+        """What the valves connect each chamber to: "positive", "vacuum", "off", or "both", which must never happen."""
         body, head, tail = (CONNECTIONS[self.valves >> 2 * i & 3] for i in range(3))
         return body, head, tail
 
 
 @dataclass(frozen=True)
 class Status:
-    """What the Uno says about itself."""
+    """What the Uno reports about itself."""
 
     state: str
     fault: str
@@ -80,13 +80,13 @@ class Status:
 
 
 class Uno:
-    """A session with the Uno. As a context manager it leaves the robot standing, however it ends (bifa.link.leaving).
+    """A session with the Uno. As a context manager, it stops the robot however the block ends (bifa.link.leaving).
 
-    `may_move`: something has been asked of it that turns valves on, or some were on, and no stop was confirmed since.
+    `may_move`: a command that turns valves on was sent, or some valve was on, and no stop has been confirmed since.
     """
 
     def __init__(self, transport: Transport, clock: Clock, seed: int | None = None) -> None:
-        """`seed` makes the session's key repeatable (tests in virtual time)."""
+        """`seed` makes the session's key reproducible (for tests in virtual time)."""
         self.session = Session(transport, clock, seed)
         self.session.on_sample = self._take_sample
         self.session.on_renewed = self._stream_again
@@ -95,7 +95,7 @@ class Uno:
         self._clock = clock
         self._samples: deque[Sample] = deque(maxlen=100_000)
         self._time_us: int | None = None
-        self._timed_s = 0.0  # by the host's clock, when `_time_us` was heard
+        self._timed_s = 0.0  # host time at which `_time_us` arrived
         self._last_sample: tuple[int, int] | None = None  # its number and time
         self._streaming = False
         self._next_exchange_s = math.inf
@@ -113,9 +113,9 @@ class Uno:
             leaving.leave(self)
 
     def _leave(self, error: BaseException | None) -> None:
-        """Raises StillMovingError from `error` if the robot moved and does not confirm that it stands."""
+        """Stop the robot; raises StillMovingError from `error` if it may be moving and does not confirm the stop."""
         try:
-            if self.session.hello is None:  # nobody there: nothing was moved, and nobody will answer
+            if self.session.hello is None:  # never connected: nothing was moved, and nothing will answer
                 self.send_stop()
             else:
                 leaving.stop_in_new_session(self.session)
@@ -136,24 +136,24 @@ class Uno:
         for _ in range(EXCHANGES_AT_START):
             self.exchange_clocks()
         self._read_set()
-        status = self.status()  # it may walk already: not every port restarts it
+        status = self.status()  # it may be walking already: not every port restarts the Uno
         self.may_move = self.may_move or status.valves != 0 or status.state == "running" or status.is_schedule_running
         return hello
 
     @property
     def counters(self) -> Counters:
-        """What the link has been through on the host's side."""
+        """The link's counters on the host's side."""
         return self.session.counters
 
     def exchange_clocks(self) -> None:
-        """One more measurement for `clock_relation`."""
+        """Add one measurement to `clock_relation`."""
         [answer] = self.session.call_all([("read_clock", ())])
         uno_s = self._unwrap(answer.report["time_us"]) / 1e6
         self.clock_relation.add(answer.sent_s - CLOCK_TICK_S, uno_s, answer.received_s)
         self._next_exchange_s = self._clock.now() + self._exchange_every_s
 
     def keep_alive(self) -> None:
-        """Talk to the Uno if it is time to: relates the clocks, and keeps `host_timeout_s` from venting."""
+        """Exchange clocks if that is due, which also keeps the Uno from venting by its `host_timeout_s`."""
         if self._clock.now() >= self._next_exchange_s:
             self.exchange_clocks()
 
@@ -165,29 +165,29 @@ class Uno:
     # -- parameters -------------------------------------------------------------------------------------------
 
     def parameters(self) -> dict[str, float]:
-        """All parameters, read from the Uno."""
+        """Read all parameters from the Uno."""
         return self.parameters_and_pending()[0]
 
     def parameters_and_pending(self) -> tuple[dict[str, float], bool]:
-        """parameters(), and whether a walking robot adopts them only at its next cycle."""
+        """Return parameters(), and whether a walking robot has yet to adopt them at its next cycle."""
         values, is_pending = self._read_set()
         return {name: from_wire(name, value) for name, value in values.items()}, is_pending
 
     def get(self, name: str) -> float:
-        """One parameter, read from the Uno."""
+        """Read one parameter from the Uno."""
         index_of(name)
         return self.parameters()[name]
 
     def set(self, name: str, value: float) -> None:
-        """Change one parameter; the others stay."""
+        """Change one parameter and keep the others."""
         self.upload({name: value})
 
     def upload(self, parameters: Mapping[str, float], save: str | None = None, wait: bool = False) -> None:
-        """Replace the parameter set as a whole and read it back; parameters not named stay as they are.
+        """Replace the parameter set as a whole and read it back; parameters not named keep their values.
 
-        A walking robot adopts the new set at the next cycle boundary: `wait` returns only then. `save` keeps it as a
-        preset as well. Raises UnoParameterError before anything is sent if a value is out of range, and LinkError if
-        the Uno ends up with anything but what was meant.
+        A walking robot adopts the new set at the next cycle boundary; with `wait`, the call returns only then. `save`
+        also keeps the set as a preset of that name. Raises UnoParameterError before anything is sent if a value is out
+        of range, and LinkError if the Uno ends up with other values than those sent.
         """
         wanted = {name: to_wire(name, value) for name, value in parameters.items()}
         wanted = {**self._read_set()[0], **wanted}
@@ -203,13 +203,13 @@ class Uno:
         check = binascii.crc_hqx(data, 0xFFFF)
         self.session.call_all([("begin", ()), *fields, ("commit", (check,))])
         if self._read_set()[0] != wanted:
-            raise LinkError("the parameters read back are not those sent; upload again")
+            raise LinkError("the parameters read back differ from those sent; upload again")
 
     def _wait_for_boundary(self, period_s: float) -> None:
         deadline = self._clock.now() + 2 * max(period_s, 60.0)
         while self._read_set()[1]:
             if self._clock.now() > deadline:
-                raise LinkError("the Uno did not take the new parameters at a cycle boundary; look at its status")
+                raise LinkError("the Uno did not adopt the new parameters at a cycle boundary; check its status")
             self.session.poll(0.02)
 
     def _read_set(self) -> tuple[dict[str, int], bool]:
@@ -221,11 +221,11 @@ class Uno:
     # -- presets ----------------------------------------------------------------------------------------------
 
     def save(self, preset: str) -> None:
-        """Keep the parameters in EEPROM; returns after they were read back."""
+        """Save the parameters in EEPROM; returns after they have been read back."""
         self.session.call("save", _name_field(preset), timeout_s=EEPROM_TIMEOUT_S)
 
     def load(self, preset: str) -> None:
-        """Take the parameters of a preset."""
+        """Load the parameters of a preset."""
         self.session.call("load", _name_field(preset))
         self._read_set()
 
@@ -234,7 +234,7 @@ class Uno:
         self.session.call("forget", _name_field(preset), timeout_s=EEPROM_TIMEOUT_S)
 
     def presets(self) -> dict[str, bool]:
-        """Names of all presets; True for those in EEPROM, False for those from the factory."""
+        """Names of all presets: True for those in EEPROM, False for factory presets."""
         presets: dict[str, bool] = {}
         index = 0
         while True:
@@ -250,13 +250,13 @@ class Uno:
         self._read_set()
 
     def zero(self, factory: bool = False) -> None:
-        """Take the present pressures (vented, at rest) as zero and keep that in EEPROM; or undo it (`factory`)."""
+        """Take the present pressures (vented, at rest) as zero and keep that in EEPROM; `factory` undoes it."""
         self.session.call("zero", int(factory), timeout_s=EEPROM_TIMEOUT_S)
 
     # -- motion -----------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Walk."""
+        """Start walking."""
         self.may_move = True
         self.session.call("run")
 
@@ -266,10 +266,10 @@ class Uno:
         self.may_move = False
 
     def stop(self) -> None:
-        """The real-time stop: all valves off, latched until clear(); repeated until the Uno says that it is so.
+        """Send the real-time stop (all valves off, latched until clear()) repeatedly until the Uno confirms it.
 
-        Raises StillMovingError if it does not within five seconds, RestartedError if it restarted (which turns all
-        valves off as well).
+        Raises StillMovingError if that takes more than five seconds, RestartedError if the Uno restarted (which also
+        turns all valves off).
         """
         try:
             leaving.stop_until_confirmed(
@@ -280,7 +280,7 @@ class Uno:
         self.may_move = False
 
     def send_stop(self) -> None:
-        """The real-time stop without waiting for an answer; from any thread."""
+        """Send the real-time stop without waiting for an answer; callable from any thread."""
         self.session.send_stop()
 
     def clear(self) -> None:
@@ -295,10 +295,10 @@ class Uno:
         self.session.call("hold", *fields)
 
     def schedule(self, holds: Iterable[tuple[float, str, str]]) -> None:
-        """Start timed holds (time_s, chamber, state), in order of time, executed by the Uno on its own ticks (1 ms).
+        """Start timed holds (time_s, chamber, state), in order of time; the Uno executes them on its own 1 ms ticks.
 
-        Time 0 is the start, which is sent only when the Uno has every entry. Raises UnoParameterError, before anything
-        is sent, for more than SCHEDULE_ENTRIES, RefusedError for times that go backwards.
+        Time 0 is the start, which is commanded only after the Uno has every entry. Raises UnoParameterError, before
+        anything is sent, for more than SCHEDULE_ENTRIES holds, and RefusedError for times that go backwards.
         """
         additions = [("schedule_add", (_milliseconds(time_s), *_hold_fields(c, s))) for time_s, c, s in holds]
         if len(additions) > SCHEDULE_ENTRIES:
@@ -335,22 +335,22 @@ class Uno:
         )
 
     def stream(self, on: bool) -> None:
-        """Telemetry in frames, 100 samples a second."""
+        """Switch telemetry in frames, 100 samples a second, on or off."""
         if on and not self._streaming:
-            self._last_sample = None  # before the call, within which the first samples may come
+            self._last_sample = None  # before the call, during which the first samples may arrive
         self.session.call("stream", int(on))
         self._streaming = on
 
     def mark_strobe(self, timeout_s: float = 1.0) -> int:
-        """Leave out the next MARK_PAUSE strobes, while streaming, so that an instrument sees the pause; the number
-        (`Sample.sequence`) of the sample whose strobe comes first after it. No sample is left out.
+        """Skip the next MARK_PAUSE strobes while streaming, as a mark that an instrument can see; return the number
+        (`Sample.sequence`) of the sample with the first strobe after the pause. No sample is skipped.
 
-        Raises LinkError where no samples arrive.
+        Raises LinkError if no samples arrive.
         """
         deadline = self._clock.now() + timeout_s
         while self._last_sample is None:
             if self._clock.now() > deadline:
-                raise LinkError("the Uno streams no samples: nothing to mark")
+                raise LinkError("the Uno streams no samples, so no strobe can be marked")
             self.session.poll(0.02)
         self.session.call("mark")
         return _unwrapped(self.session.call("read_clock")["marked"], self._last_sample[1], self._last_sample)
@@ -360,10 +360,10 @@ class Uno:
             self.session.call("stream", 1)
 
     def samples(self, duration_s: float) -> list[Sample]:
-        """The samples since the last call and those of the next `duration_s`, which pass before this returns: 2.0 gives
-        some 200. Keeps the link alive.
+        """Wait for `duration_s`, and return all samples since the last call, about 100 a second. Keeps the link alive.
 
-        Raises RestartedError as soon as the Uno says that it restarted; `taken_samples` then has what had arrived.
+        Raises RestartedError as soon as the Uno reports that it restarted; `taken_samples` then returns what had
+        arrived.
         """
         deadline = self._clock.now() + duration_s
         self.keep_alive()
@@ -374,7 +374,7 @@ class Uno:
         return self.taken_samples()
 
     def taken_samples(self) -> list[Sample]:
-        """The samples that have arrived and that no call has returned yet; does not touch the link."""
+        """Return the samples that have arrived and that no call has returned yet, without using the link."""
         samples = list(self._samples)
         self._samples.clear()
         return samples
@@ -404,8 +404,8 @@ class Uno:
         )
 
     def _unwrap(self, time_us: int) -> int:
-        """The Uno's 32-bit microseconds (they wrap every 71.6 minutes) as a time that goes on. What arrives may be a
-        little older than what came before; how often it has wrapped in a longer silence, the host's clock tells."""
+        """Unwrap the Uno's 32-bit microseconds, which wrap every 71.6 minutes. A time may be a little older than the
+        previous one; after a longer silence, the host's clock tells how often the Uno's has wrapped."""
         now_s = self._clock.now()
         if self._time_us is None:
             self._time_us, self._timed_s = time_us, now_s
@@ -425,8 +425,8 @@ def _psi(milli: tuple[int, int, int]) -> tuple[float, float, float]:
 
 
 def _unwrapped(sequence: int, time_us: int, last: tuple[int, int]) -> int:
-    """The 16 bits of the number of a sample of that time as one that goes on from the last: samples are a fixed time
-    apart, however many are missing between. `last`: its number and time."""
+    """Unwrap the 16-bit number of a sample taken at `time_us`; `last`: number and time of the previous sample. Samples
+    are a fixed time apart, so the times tell how many are missing in between."""
     due = last[0] + round((time_us - last[1]) / SAMPLE_US)
     return due + (sequence - due + 32767) % 65536 - 32767
 

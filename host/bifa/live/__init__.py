@@ -1,1 +1,1 @@
-"""What people see of a running Uno: the interactive console and the live monitor."""
+"""Live views of a running Uno: the interactive console, the monitor, the live page; and recording."""

@@ -1,4 +1,4 @@
-"""What may come next in a console line, each with a few words beside it: a parameter's meaning, range and value."""
+"""Completion of console lines, with a description of each word: a parameter's meaning, range and value."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -22,14 +22,14 @@ SECOND = {
 
 @dataclass
 class Known:
-    """What the Uno last said about itself; presets: True for saved ones, False for those from the factory."""
+    """What the Uno last reported about itself; presets: True for saved ones, False for factory ones."""
 
     parameters: Mapping[str, float] = field(default_factory=dict)
     presets: Mapping[str, bool] = field(default_factory=dict)
 
 
 def words_after(words: list[str], known: Known) -> dict[str, str]:
-    """What may follow the complete words of a line, and what is worth knowing about each."""
+    """Return the words that may follow the complete words of a line, each with its description."""
     now = {name: f", now {value:.10g}" for name, value in known.parameters.items()}
     parameters = {p.name: f"{range_text(p)}{now.get(p.name, '')}; {p.help}" for p in PARAMETERS}
     commands = {name: text for name, _, text in CONSOLE_COMMANDS}

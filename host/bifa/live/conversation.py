@@ -1,4 +1,4 @@
-"""One thread that has the link to itself: carries out typed lines in order, takes telemetry in between."""
+"""A thread that owns the link: it carries out typed lines in order and takes telemetry in between."""
 
 import contextlib
 import queue
@@ -16,7 +16,7 @@ WAIT_S = 0.02
 
 
 class Conversation:
-    """What was typed goes in with type(); answers and what the Uno says by itself are printed as they come."""
+    """Carries out lines given to type(); answers and unsolicited lines of the Uno are printed as they arrive."""
 
     def __init__(self, uno: Uno, rig: Rig) -> None:
         """`uno` is connected."""
@@ -32,20 +32,20 @@ class Conversation:
         self._thread.start()
 
     def type(self, text: str) -> None:
-        """Have lines carried out; returns at once."""
+        """Queue lines to be carried out; returns at once."""
         for line in text.splitlines():
             self._typed.put(line)
 
     def stop(self) -> None:
-        """The real-time stop, in place of everything that waits; the thread sees to its confirmation."""
-        with contextlib.suppress(ConnectionError):  # the thread finds out as well, and ends
+        """Send the real-time stop and drop all waiting lines; the thread then waits for the confirmation."""
+        with contextlib.suppress(ConnectionError):  # the thread meets the same error, and ends
             self.uno.send_stop()
         if dropped := self._dropped():
             print(f"-- not carried out: {', '.join(dropped)}")
         self._is_stopping = True
 
     def _dropped(self) -> list[str]:
-        """What was typed and has not begun; it will not be carried out."""
+        """Remove and return the typed lines that have not begun."""
         lines: list[str | None] = []
         with contextlib.suppress(queue.Empty):
             while True:
@@ -61,7 +61,7 @@ class Conversation:
 
     @uninterrupted
     def abandon(self) -> None:
-        """Stop the robot at once, forget what waits, end; the link is then free for others."""
+        """Stop the robot at once, drop waiting lines, and end the thread; the link is then free for others."""
         self.uno.session.abandon()
         with contextlib.suppress(ConnectionError):
             self.uno.send_stop()
@@ -81,7 +81,7 @@ class Conversation:
             self.ended.set()
 
     def _round(self) -> bool:
-        """One line or a few samples; False after the last line."""
+        """Carry out one line, if there is one, and take a few samples; False after the last line."""
         line: str | None = ""
         try:
             if self._is_stopping:
@@ -108,7 +108,7 @@ class Conversation:
         except NoAnswerError as error:
             lines = [f"-- {error}"]
         try:
-            self._learn()  # first, so that who reads the answer finds completion up to date
+            self._learn()  # first, so that completion is up to date when the answer appears
         finally:
             print("\n".join(lines))
 
@@ -117,6 +117,6 @@ class Conversation:
         self.uno.stream(True)
 
     def _learn(self) -> None:
-        """What completion offers."""
+        """Read what completion offers."""
         self.known.parameters = self.uno.parameters()
         self.known.presets = self.uno.presets()

@@ -1,5 +1,5 @@
-"""How fast the robot walks, by its own phase, whatever gait it is thought to have: over its last whole cycle, and
-over the settled ones."""
+"""Walking speed over the last whole cycle and over the settled cycles, delimited by the robot's own phase, whatever
+gait it is thought to have."""
 
 import math
 from collections import deque
@@ -10,21 +10,21 @@ from bifa.gait.settling import LEAST, MOST_CYCLES, speed_of_cycles
 
 
 class CycleSpeed:
-    """Take a position with every look. `mm_s` is None until there has been a whole cycle of walking; `settled` says, as
-    of any measured walk, what its settled cycles come to, and nothing before there are enough of them to tell."""
+    """Speeds from the positions passed to `take`. `mm_s` is None until there has been a whole cycle of walking;
+    `settled` is the speed of the settled cycles in words, as for any measured walk, empty until there are enough."""
 
     def __init__(self) -> None:
         self._begin()
 
     def _begin(self) -> None:
-        self.path: deque[tuple[float, float, float]] = deque()  # cycles, time, position: of the last one
-        self._ends: deque[tuple[float, float]] = deque(maxlen=MOST_CYCLES + 1)  # of cycles: time, position
+        self.path: deque[tuple[float, float, float]] = deque()  # cycles, time, position over the last cycle
+        self._ends: deque[tuple[float, float]] = deque(maxlen=MOST_CYCLES + 1)  # ends of cycles: time, position
         self._phase_rad: float | None = None
         self._cycles = 0.0
         self.settled = ""
 
     def take(self, is_walking: bool, time_s: float, phase_rad: float, position_mm: float) -> None:
-        """One look: the body's phase and where the head is. A robot that stands, or restarts, has no cycle."""
+        """Add one reading: the body's phase and the head's position. Standing still or a restart starts a new walk."""
         if not is_walking or (self.path and time_s < self.path[-1][1]):
             self._begin()
             return
@@ -41,7 +41,7 @@ class CycleSpeed:
 
     @property
     def mm_s(self) -> float | None:
-        """Over the last whole cycle, from where it was a cycle ago between two looks."""
+        """Speed over the last whole cycle, whose beginning is interpolated between two readings."""
         if not self.path or (began := self._cycles - 1.0) < self.path[0][0]:
             return None
         then_s, then_mm = _between(self.path[0], self.path[1], began)
@@ -50,7 +50,7 @@ class CycleSpeed:
 
 
 def _between(early: tuple[float, float, float], late: tuple[float, float, float], cycles: float) -> tuple[float, float]:
-    """Time and place when so many cycles had passed, between two looks."""
+    """Interpolate time and position at `cycles`, between two readings."""
     (c0, t0, x0), (c1, t1, x1) = early, late
     share = (cycles - c0) / (c1 - c0) if c1 > c0 else 1.0
     return t0 + share * (t1 - t0), x0 + share * (x1 - x0)

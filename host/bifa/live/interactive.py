@@ -23,7 +23,7 @@ _WIDE = 80
 
 
 def status_lines(conversation: Conversation, columns: int = _WIDE) -> StyleAndTextTuples:
-    """Two lines, shorter where there are fewer than 80 columns: the robot; the link."""
+    """Return two lines, one for the robot and one for the link; shorter below 80 columns."""
     sample, link = conversation.latest.sample, conversation.uno.counters.text()
     if sample is None:
         return [("", " no telemetry yet\n"), ("", f" link: {link}")]
@@ -40,19 +40,19 @@ def status_lines(conversation: Conversation, columns: int = _WIDE) -> StyleAndTe
 
 
 def _history() -> History:
-    """The history of earlier consoles; where no file can be kept, of this one alone."""
+    """Return the history of earlier consoles, or of this one alone if no file can be kept."""
     try:
         folder = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "bifa"
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / "console-history").open("a+b"):
             return FileHistory(str(folder / "console-history"))
-    except (OSError, RuntimeError) as error:  # RuntimeError: nobody's home
+    except (OSError, RuntimeError) as error:  # RuntimeError: no home directory
         print(f"history is not kept: {error}")
         return InMemoryHistory()
 
 
 def _keys(conversation: Conversation) -> KeyBindings:
-    """The prompt reads the terminal raw: keys that send signals elsewhere are only keys here, and mean the same."""
+    """Bind keys to their usual actions: the prompt reads the terminal raw, so that none of them sends a signal."""
     keys = KeyBindings()
 
     @keys.add("!")
@@ -62,9 +62,9 @@ def _keys(conversation: Conversation) -> KeyBindings:
     @keys.add("c-z")
     def _(event: KeyPressEvent) -> None:
         conversation.stop()
-        event.app.suspend_to_background()  # by the signal, so that what is resumed ends
+        event.app.suspend_to_background()  # by the signal, so that the program ends when resumed
 
-    @keys.add("c-c")  # while the history is searched as well
+    @keys.add("c-c")  # also during a search of the history
     @keys.add("c-\\")
     def _(event: KeyPressEvent) -> None:
         conversation.stop()
@@ -93,7 +93,7 @@ def _prompt(conversation: Conversation) -> PromptSession[str]:
 
 
 def converse(uno: Uno, rig: Rig) -> None:
-    """Prompt until Ctrl-D, Ctrl-C, Ctrl-Z or Ctrl-\\; raises what ended the link, if something did."""
+    """Prompt until Ctrl-D, Ctrl-C, Ctrl-Z or Ctrl-\\; raises the error that ended the link, if any."""
     print("type help; Tab completes; ! stops at once; Ctrl-D leaves, all valves off")
     conversation = Conversation(uno, rig)
     try:

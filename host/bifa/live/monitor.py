@@ -1,4 +1,4 @@
-"""A live picture of the robot in the terminal: pressures with their last seconds, valves, phases, the link."""
+"""Live display of the robot in the terminal: pressures over the last seconds, valves, phases, the link."""
 
 import math
 from collections import deque
@@ -17,30 +17,29 @@ from bifa.live.rounds import Latest, Pace
 from bifa.screen import Console
 
 REFRESH_S = 0.1
-_WIDEST, _NARROWEST, _BESIDE = 72, 8, 50  # characters of the trace, and of what stands beside it
+_WIDEST, _NARROWEST, _BESIDE = 72, 8, 50  # characters: width of the trace, and of the columns beside it
 COLORS = {"positive": "red", "vacuum": "blue", "off": "", "both": "bold white on red"}
 
-SHORTEST_S = 2.4  # of the trace
-_MOST = 1200  # samples: two minutes of pictures, twice the longest cycle
+SHORTEST_S = 2.4  # least duration of the trace
+_MOST = 1200  # samples, one per picture: two minutes, twice the longest cycle
 BLOCKS = " ▁▂▃▄▅▆▇█"
 LOWEST_PSI, HIGHEST_PSI = -15.0, 15.0
 
 
 def dial(phase_rad: float) -> str:
-    """Where in its cycle an oscillator is, in tenths."""
+    """Draw where in its cycle an oscillator is, in tenths."""
     at = int(phase_rad / (2 * math.pi) * 10) % 10
     return "·" * at + "●" + "·" * (9 - at)
 
 
 class Trace:
-    """The pressures of the last cycle of the body's oscillator, at least of some seconds, drawn in whatever room there
-    is."""
+    """Pressures over the last cycle of the body's oscillator, or over SHORTEST_S if longer, drawn at any width."""
 
     def __init__(self) -> None:
-        self._kept: deque[tuple[Sample, float]] = deque(maxlen=_MOST)  # with the cycles done until then
+        self._kept: deque[tuple[Sample, float]] = deque(maxlen=_MOST)  # with the cycles completed by then
 
     def take(self, sample: Sample) -> None:
-        """The newest; what came before a restart of the Uno, whose clock begins again, is dropped."""
+        """Add the newest sample. If the Uno has restarted, so that its clock began again, drop all earlier ones."""
         if self._kept and sample.time_us < self._kept[-1][0].time_us:
             self._kept.clear()
         done = self._kept[-1][1] + _cycles(self._kept[-1][0], sample) if self._kept else 0.0
@@ -49,7 +48,7 @@ class Trace:
             self._kept.popleft()
 
     def _spare(self) -> bool:
-        """Whether the oldest is needed neither for a cycle nor for the shortest time."""
+        """Whether the oldest sample is needed neither for a whole cycle nor for the shortest duration."""
         if len(self._kept) < 3:
             return False
         second, done = self._kept[1]
@@ -59,21 +58,21 @@ class Trace:
 
     @property
     def seconds(self) -> float:
-        """How long ago the oldest was."""
+        """Age of the oldest sample."""
         return (self._kept[-1][0].time_us - self._kept[0][0].time_us) / 1e6 if self._kept else 0.0
 
     def sparkline(self, chamber: int, width: int) -> str:
-        """A chamber's pressure as `width` blocks at most, from LOWEST_PSI to HIGHEST_PSI."""
+        """Draw a chamber's pressure as at most `width` blocks, from LOWEST_PSI to HIGHEST_PSI."""
         values = [sample.pressure_psi[chamber] for sample, _ in self._kept]
         count = min(width, len(values))
         bounds = [round(i * len(values) / count) for i in range(count + 1)] if count else []
         usual = sum(values) / max(len(values), 1)
-        # of each stretch the most unusual value: a short pulse is seen at any width
+        # draw the value of each stretch that is farthest from the mean: a short pulse is visible at any width
         return "".join(_block(max(values[a:b], key=lambda v: abs(v - usual))) for a, b in pairwise(bounds))
 
 
 def _cycles(before: Sample, after: Sample) -> float:
-    """By how much the body's oscillator went on; a little back in a transient."""
+    """Cycles by which the body's oscillator advanced; slightly negative in a transient."""
     turned = (after.phase_rad[0] - before.phase_rad[0]) / (2 * math.pi)
     return turned - round(turned)
 
@@ -93,13 +92,13 @@ class Monitor:
         self._trace = Trace()
 
     def take(self, samples: list[Sample]) -> None:
-        """The samples since the last picture; the last one is shown."""
+        """Add the samples since the last picture; the last one is shown."""
         self._latest.take(samples)
         if samples:
             self._trace.take(samples[-1])
 
     def draw(self, columns: int) -> Panel:
-        """The picture as it is now, so many characters wide: in fewer the last cycle is drawn more coarsely."""
+        """Draw the present state, `columns` characters wide; in fewer, the last cycle is drawn more coarsely."""
         sample = self._latest.sample
         width = max(_NARROWEST, min(_WIDEST, columns - _BESIDE))
         table = Table(box=None, pad_edge=False)
@@ -123,10 +122,11 @@ class Monitor:
 
 
 def watch(uno: Uno, clock: Clock, console: Console, duration_s: float | None, begin: Callable[[Uno], None]) -> None:
-    """Connect, `begin(uno)`, and draw until Ctrl-C or for `duration_s`; the last picture stays, the robot stands."""
+    """Connect, call `begin(uno)`, and draw until Ctrl-C or for `duration_s`; then stop the robot, and leave the last
+    picture on the screen."""
     monitor = Monitor(uno)
     try:
-        # The robot is the innermost: it stands before anything more is drawn.
+        # `uno` is the innermost context: the robot is stopped before anything more is drawn.
         with Live(console=console, auto_refresh=False, screen=console.is_terminal) as live, uno:
             live.update("waiting for the Uno", refresh=True)
             uno.connect()

@@ -26,7 +26,7 @@ from bifa.rig import GONE, RETRY_S, Rig, SameBoard
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
 
-RESTARTS = 3  # of a board that kept its power, while its port was away: each counts its boot number on by one
+RESTARTS = 3  # most restarts of a board while its port is away; each increments its boot number
 HEADER = [
     "time_s",
     "host_time_s",
@@ -40,13 +40,13 @@ HEADER = [
 
 
 class RecordingError(BifaError):
-    """A recording cannot be made there."""
+    """A recording cannot be made in a folder or file."""
 
 
 def record_walks(
     rig: Rig, port: str | None, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console
 ) -> None:
-    """Walk `repeats` times into the data set `out`; an interrupted session goes on where it was."""
+    """Record `repeats` walks into the data set `out`; an interrupted session resumes where it stopped."""
     from bifa.gait.settling import LEAST, Walking, measured_speed
     from bifa.measure.bench_file import known_of
     from bifa.measure.plan import walks
@@ -80,7 +80,7 @@ def record_walks(
         )
     console.print(
         f"{out}: {counted(repeats, 'walk')} of {counted(cycles, 'cycle')}, firmware {dataset.provenance['firmware']}; "
-        f"look at it with: {shlex.join(['bifa', 'check', str(out)])}",
+        f"check it with: {shlex.join(['bifa', 'check', str(out)])}",
         soft_wrap=True,
     )
 
@@ -88,7 +88,7 @@ def record_walks(
 def record_telemetry(
     board: SameBoard, out: Path, gait_file: Path | None, duration_s: float | None, console: Console
 ) -> None:
-    """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
+    """Record a bare Uno's telemetry into `out`/telemetry_<n>.csv, a new file each time that the port comes back."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
     if out.exists() and any(entry for entry in out.iterdir() if not entry.name.startswith("telemetry_")):
         raise RecordingError(f"{out} contains other files; choose a new folder")
@@ -119,14 +119,14 @@ def record_telemetry(
 
 @dataclass
 class _TelemetryLog:
-    """Records from one board and no other, which walks by itself only the first time."""
+    """Recorder for one particular board, which walks without being asked only the first time."""
 
     _board: SameBoard
     _parameters: dict[str, float]
     _end_s: float
     _console: Console
     _desk: Desk
-    _nonce: int | None = None  # of the start that was seen last; None before the first
+    _nonce: int | None = None  # boot number of the last start that was seen; None before the first
 
     @property
     def has_begun(self) -> bool:
@@ -134,7 +134,7 @@ class _TelemetryLog:
         return self._nonce is not None
 
     def record_until_gone(self, path: Path) -> None:
-        """Into the new file `path`; raises one of GONE when the Uno is."""
+        """Record into the new file `path`; raises one of GONE when the Uno is disconnected."""
         uno: Uno | None = None
         try:
             with self._board.open() as rig, self._console.status("waiting for the Uno") as status:
@@ -156,7 +156,7 @@ class _TelemetryLog:
                 self._console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)
 
     def _greet(self, uno: Uno) -> str:
-        """Connect; in words, whether this is known to be the board that was recorded before."""
+        """Connect; return in words whether this is known to be the board that was recorded before."""
         nonce = uno.connect().boot_nonce
         followed = self._nonce is not None and 0 <= (nonce - self._nonce) % 65536 <= RESTARTS
         self._nonce = nonce
@@ -166,7 +166,7 @@ class _TelemetryLog:
 
     def _ask(self, known: str) -> None:
         if sys.stdin is not None and sys.stdin.isatty():
-            self._desk.ask("walk", f"{known}. Recording goes on. Press Enter to walk again; q ends.")
+            self._desk.ask("walk", f"{known}. Recording continues. Press Enter to walk again; q ends.")
             return
         self._console.print(
             f"{known}: recording without walking, since no one can be asked; to walk, run the command again"
@@ -177,7 +177,7 @@ class _TelemetryLog:
             while time.monotonic() < self._end_s:
                 writer.writerows(telemetry_row(uno, sample, marked) for sample in uno.samples(0.5))
                 file.flush()
-                if self._parameters:  # a robot that stands is recorded for nobody as well
+                if self._parameters:  # at rest, recording continues even if nobody reads the output
                     look_for_a_reader()
                 status.update(f"recording  {uno.counters.text()}")
                 self._walk_if_told(uno)
@@ -191,26 +191,26 @@ class _TelemetryLog:
             self._desk.again(answer, "press Enter to walk")
             return
         try:
-            uno.clear()  # where opening the port restarts nothing, it is still stopped
+            uno.clear()  # if opening the port did not restart it, it is still stopped
             uno.run()
         except RefusedError as error:
             self._console.print(str(error))
 
 
 def next_file(out: Path) -> Path:
-    """Numbered one above the highest, whatever is missing before it."""
+    """Return the path numbered one above the highest, whether or not numbers below are missing."""
     numbers = [path.stem.removeprefix("telemetry_") for path in out.glob("telemetry_*.csv")]
     return out / f"telemetry_{1 + max((int(n) for n in numbers if n.isdecimal()), default=0)}.csv"
 
 
 @contextmanager
 def telemetry_file(path: Path) -> Iterator[TextIO]:
-    """A new file; if the disk fills, it ends with its last whole line, and RecordError says so."""
+    """Create a file; if the disk fills, truncate it after its last whole line and raise RecordingError."""
     file = None
     try:
         with path.open("x", encoding="utf-8", newline="") as file:
             yield file
-    except GONE:  # the port, of which the file knows nothing
+    except GONE:  # an error of the port, not of the file
         raise
     except OSError as error:
         if file is None:

@@ -1,4 +1,4 @@
-"""What a live view asks in each round: is the rig in step with the wall clock, and is the newest sample new?"""
+"""What every live view does each round: keep the rig in step with the wall clock, and note how old the data are."""
 
 import time
 
@@ -9,8 +9,7 @@ STALE_S = 1.0
 
 
 class Pace:
-    """Keeps a rig in step with the wall clock: a virtual rig waits for it, a real one is in step by itself. Call `wait`
-    once a round."""
+    """Keeps a virtual rig in step with the wall clock; a real one is in step by itself. Call `wait` once a round."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -26,7 +25,7 @@ class Pace:
 
 
 class Latest:
-    """The newest sample (None until the first), and how old it is: nothing may look live that is not."""
+    """The newest sample (None until the first) and its age, so that stale data never look live."""
 
     def __init__(self) -> None:
         self.sample: Sample | None = None

@@ -1,4 +1,4 @@
-"""Walk without a monitor, until somebody ends it or the robot stops by itself."""
+"""Walk without a monitor, until the user ends it or the robot stops by itself."""
 
 import errno
 import math
@@ -15,10 +15,9 @@ LOOK_EVERY_S = 0.5
 
 
 def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable[[str], None]) -> None:
-    """Walk for `duration_s`, or until an exception; `on_progress` is told time, cycle and pressures.
+    """Walk for `duration_s`, or until an exception; `on_progress` receives time, cycle and pressures as text.
 
-    Raises LinkError if the Uno stops by itself, with its reason, and BrokenPipeError once nobody can read any more what
-    is printed.
+    Raises LinkError with the reason if the Uno stops by itself, and BrokenPipeError once the output has no reader.
     """
     period_s = uno.parameters()["period_s"]
     uno.run()
@@ -30,7 +29,7 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
         status = uno.status()
         if status.state != "running":
             raise LinkError(
-                f"the robot stopped walking: it is {status.state} (fault: {status.fault}); see bifa console"
+                f"the robot stopped walking (state: {status.state}, fault: {status.fault}); see bifa console"
             )
         walked_s = clock.now() - began_s
         pressures = "  ".join(f"{name} {psi:+.1f}" for name, psi in zip(CHAMBERS, status.pressure_psi, strict=True))
@@ -39,14 +38,14 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
 
 
 def look_for_a_reader() -> None:
-    """Walking prints nothing, so that a pipe or a terminal that has been closed would not show by itself."""
+    """Raise BrokenPipeError if nobody reads stdout; walking prints nothing, so a closed pipe would go unnoticed."""
     if not hasattr(select, "poll"):
         return
     try:
         reader = select.poll()
-        reader.register(sys.stdout.fileno(), 0)  # POLLERR and POLLHUP come unasked
+        reader.register(sys.stdout.fileno(), 0)  # POLLERR and POLLHUP are always reported
         gone = reader.poll(0)
-    except (AttributeError, ValueError, OSError):  # there has been none from the beginning
+    except (AttributeError, ValueError, OSError):  # there never was a reader
         return
     if gone:
         raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))

@@ -1,9 +1,9 @@
 """Bring an instrument's record onto the Uno's clock.
 
 The Uno's sampling strobe (D10) is wired to the instrument's sync input: the instrument stamps each rising edge with its
-own clock, the Uno stamps the same edge in its telemetry. One edge looks like the next; so that both sides number them
-alike, the Uno leaves out ten strobes when it is told to (`mark`) and names the sample that comes first after the
-pause. A straight line through the pairs gives offset and drift; what is left is the alignment's error.
+own clock, the Uno stamps the same edge in its telemetry. All edges look alike; so that both sides number them the same
+way, the Uno omits ten strobes on command (`mark`) and reports the number of the first sample after the pause. A
+straight line through the pairs gives offset and drift; the scatter about it is the alignment's error.
 """
 
 from dataclasses import dataclass
@@ -18,20 +18,20 @@ from bifa.link.table import MARK_PAUSE
 MIN_EDGES = 20
 MAX_RMS_S = 2e-3
 MAX_DRIFT = 0.01  # the Uno's resonator is good to 0.5 %
-_OFF_GRID = 0.4  # periods by which an edge may miss its place
-_FOLLOW = 0.2  # share of an edge's deviation that the next is expected to have
-SLOWEST_S = 0.0205  # between samples of a camera: 50 a second
-LONGEST_GAP_S = 0.035  # between samples that are followed by a curve: two of a hundred a second are missing
-_RESTART_PERIODS = 5  # a restart takes the bootloader's second; lost edges do not come in such numbers
+_OFF_GRID = 0.4  # largest deviation of an edge from the strobe's grid, in periods
+_FOLLOW = 0.2  # loop gain: share of an edge's deviation carried over to the next expected edge
+SLOWEST_S = 0.0205  # longest period of a camera: 50 samples a second
+LONGEST_GAP_S = 0.035  # longest gap that is interpolated: two samples missing at 100 a second
+_RESTART_PERIODS = 5  # a restart takes the bootloader's second; edges are not lost in such numbers
 
 
 class AlignmentError(BifaError):
-    """The instrument's record cannot be lined up with the Uno's clock."""
+    """The instrument's record cannot be aligned with the Uno's clock."""
 
 
 @dataclass(frozen=True)
 class ClockLine:
-    """uno_s = offset_s + rate * instrument_s, with the RMS of the edges about that line."""
+    """uno_s = offset_s + rate * instrument_s, with the RMS deviation of the edges from that line."""
 
     offset_s: float
     rate: float
@@ -39,38 +39,38 @@ class ClockLine:
     edges: int
 
     def to_uno(self, instrument_s: np.ndarray) -> np.ndarray:
-        """Instrument times [s], shape (n,), as times of the Uno's clock [s]."""
+        """Convert instrument times [s], shape (n,), to times of the Uno's clock [s]."""
         return self.offset_s + self.rate * np.asarray(instrument_s)
 
 
 def align(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndarray, marked: int) -> ClockLine:
-    """Line up an instrument's clock with the Uno's by a mark in the strobe.
+    """Align an instrument's clock with the Uno's by a mark in the strobe.
 
     sync_s: the instrument's stamps of rising edges [s], shape (m,), increasing, from before the mark; some may be lost.
     uno_s, sequence: the Uno's stamps of its samples [s] and their numbers, shape (k,); some may be lost.
     marked: number of the sample whose strobe was the first after the pause (`Uno.mark_strobe`).
 
-    Raises AlignmentError where the edges do not show the pause once and whole, too few of them pair up with samples or
-    the pairs do not lie on a line of a plausible drift: nothing is guessed.
+    Raises AlignmentError if the edges do not show exactly one complete pause, too few of them pair up with samples, or
+    the pairs do not lie on a line with a plausible drift: nothing is guessed.
     """
     gaps = _gaps(sync_s)
     pauses = np.flatnonzero(np.abs(gaps - (MARK_PAUSE + 1)) < _OFF_GRID)
     if len(pauses) > 1:
         raise AlignmentError(
-            f"the sync edges show {len(pauses)} pauses of {MARK_PAUSE} strobes, so it is not clear which one is this "
-            "recording's: restart the instrument for every recording, and repeat"
+            f"the sync edges show {len(pauses)} pauses of {MARK_PAUSE} strobes, so it is not clear which one belongs "
+            "to this recording: restart the instrument for every recording, and repeat"
         )
     if not len(pauses):
         raise AlignmentError(
             f"the sync edges do not show the pause of {MARK_PAUSE} strobes that tells which edge is which sample (the "
             f"longest gap is {gaps.max():.1f} periods): the instrument has to record from before the Uno's mark, and "
-            "must not lose an edge beside it; repeat"
+            "must not lose an edge next to it; repeat"
         )
     return _line_up(sync_s[pauses[0] + 1 :], marked, uno_s, sequence)
 
 
 def align_after_restart(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndarray) -> ClockLine:
-    """`align` with the Uno's restart as the mark: the first edge after the last long pause is its sample 1."""
+    """Like `align`, with the Uno's restart as the mark: the first edge after the last long pause is sample 1."""
     pauses = np.flatnonzero(_gaps(sync_s) > _RESTART_PERIODS)
     if not len(pauses):
         raise AlignmentError(
@@ -81,11 +81,11 @@ def align_after_restart(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndar
 
 
 def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """What a camera saw at other times, shape of `time_s`, up to two samples beyond either end of its record.
+    """Interpolate a camera's record at `time_s`, at most two samples beyond either end of it; shape of `time_s`.
 
-    A snap-through lasts a few samples: a cubic follows it, a straight line would not, and longer gaps are not filled
-    in. Raises AlignmentError where the record begins later or ends earlier, has a hole (rows or values missing, a
-    marker held or set to zero), or too few samples a second.
+    A snap-through lasts a few samples: a cubic spline follows it, linear interpolation would not. Longer gaps are not
+    filled in. Raises AlignmentError if the record begins too late or ends too early, has a gap (rows or values missing,
+    a marker held or set to zero), or has too few samples a second.
     """
     measured = np.isfinite(values)
     measured[measured] = ~held(values[measured])
@@ -104,7 +104,7 @@ def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) 
 
 
 def camera_rate(instrument_s: np.ndarray) -> dict[str, float]:
-    """The camera's own rate, noted since the trial's samples are at the Uno's."""
+    """Return the camera's own rate as a note of the trial, whose samples are at the Uno's rate."""
     return {"camera_rate_hz": round(float(1.0 / np.median(np.diff(instrument_s))), 1)}
 
 
@@ -121,7 +121,7 @@ def _refuse_holes(instrument_s: np.ndarray, time_s: np.ndarray) -> None:
     if len(wide):
         worst = wide[np.argmax(steps[wide])]
         raise AlignmentError(
-            f"the instrument's record has {len(wide)} hole{'s' if len(wide) > 1 else ''}, the longest of "
+            f"the instrument's record has {len(wide)} gap{'s' if len(wide) > 1 else ''}, the longest of "
             f"{steps[worst]:.2f} s at {instrument_s[worst] - time_s[0]:.2f} s of the trial (about "
             f"{round(steps[worst] / period_s) - 1} samples: rows missing, or a marker lost): gaps are "
             "not filled in; repeat"
@@ -129,7 +129,7 @@ def _refuse_holes(instrument_s: np.ndarray, time_s: np.ndarray) -> None:
 
 
 def _gaps(sync_s: np.ndarray) -> np.ndarray:
-    """Times between edges in periods of the strobe, shape (m - 1,)."""
+    """Intervals between edges, in periods of the strobe, shape (m - 1,)."""
     if len(sync_s) < MIN_EDGES:
         raise AlignmentError(
             f"only {len(sync_s)} sync edges: at least {MIN_EDGES} are needed; is D10 wired to the instrument's sync "
@@ -139,10 +139,10 @@ def _gaps(sync_s: np.ndarray) -> np.ndarray:
 
 
 def _numbers(sync_s: np.ndarray) -> np.ndarray:
-    """The edges' places on the strobe's grid, shape (m,), the first at 0.
+    """Positions of the edges on the strobe's grid, shape (m,), the first at 0.
 
-    Followed from edge to edge, as a phase-locked loop does: counted from the first one, an error of the period of one
-    part in 10,000 would be half a sample after a minute.
+    They are tracked from edge to edge, as in a phase-locked loop: if all were counted from the first, an error of the
+    period of one part in 10,000 would amount to half a sample after a minute.
     """
     period_s = np.median(np.diff(sync_s))
     places, due_s = np.zeros(len(sync_s), int), sync_s[0]
@@ -160,9 +160,11 @@ def _numbers(sync_s: np.ndarray) -> np.ndarray:
 
 
 def _line_up(sync_s: np.ndarray, first: int, uno_s: np.ndarray, sequence: np.ndarray) -> ClockLine:
-    """Edges of which the first belongs to the sample of number `first`."""
+    """Fit the line through edges and samples, where the first edge belongs to sample number `first`."""
     if len(sync_s) < MIN_EDGES:
-        raise AlignmentError(f"only {len(sync_s)} sync edges after the pause of the strobe: at least {MIN_EDGES}")
+        raise AlignmentError(
+            f"only {len(sync_s)} sync edges after the pause of the strobe: at least {MIN_EDGES} are needed"
+        )
     _, edge_at, sample_at = np.intersect1d(first + _numbers(sync_s), sequence, return_indices=True)
     if len(edge_at) < MIN_EDGES:
         raise AlignmentError(
@@ -186,8 +188,8 @@ def _line_up(sync_s: np.ndarray, first: int, uno_s: np.ndarray, sequence: np.nda
 
 
 def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Slope and intercept of least squares. By exact sums: what a linear algebra library says may differ in the last
-    digit from run to run, and the same seed is to give the same bytes."""
+    """Least-squares slope and intercept. Uses exact sums: results of a linear algebra library may differ in the last
+    digit from run to run, but the same seed must give the same bytes."""
     x_mean, y_mean = fsum(x) / len(x), fsum(y) / len(y)
     away = x - x_mean
     slope = fsum(away * (y - y_mean)) / fsum(away * away)

@@ -1,5 +1,5 @@
-"""What a lab knows of its bench, kept in a file (TOML): masses, supply, vacuum, asked for once; and how its instruments
-write their files, which `bifa instrument` proposes.
+"""The bench's file (TOML): masses, supply and vacuum, which are asked for once, and how the lab's instruments write
+their files, which `bifa instrument` proposes.
 
 ```toml
 [known]
@@ -51,15 +51,15 @@ def _read(path: Path) -> tuple[dict[str, Any], str]:
         raise BenchFileError(f"cannot read the bench's file {path}: {error}") from None
     if set(document) - _TABLES or not all(isinstance(table, dict) for table in document.values()):
         raise BenchFileError(
-            f"{path}: a bench's file has the tables [known] and [instrument.machine], "
-            f"[instrument.camera]; it has {', '.join(document)}"
+            f"{path}: a bench's file may have the tables [known], [instrument.machine] and "
+            f"[instrument.camera]; this one has {', '.join(document)}"
         )
     return document, text
 
 
 def read_exports(path: Path) -> dict[str, Export]:
-    """How the bench's instruments write their files, by "machine" and "camera"; none where there is no file. Raises
-    DatasetError, with the line, for a declaration that is wrong."""
+    """Return the declarations of the instruments' files under "machine" and "camera"; empty if `path` does not exist.
+    Raises DatasetError, with the line, for an invalid declaration."""
     if not path.exists():
         return {}
     document, text = _read(path)
@@ -68,7 +68,8 @@ def read_exports(path: Path) -> dict[str, Export]:
 
 
 def read_bench(path: Path) -> dict[str, float]:
-    """The known values in the file. BenchFileError where it cannot be read or a value is unknown or out of bounds."""
+    """Return the known values in the file. Raises BenchFileError if it cannot be read or a value is unknown or out of
+    bounds."""
     document, _ = _read(path)
     try:
         return parse_known(f"{name}={value}" for name, value in document.get("known", {}).items())
@@ -77,7 +78,7 @@ def read_bench(path: Path) -> dict[str, float]:
 
 
 def known_on(path: Path, desk: Desk) -> dict[str, float]:
-    """The known values of the bench; where its file does not have them they are asked for at the desk, and written."""
+    """Return the known values of the bench; if its file does not have them, ask at the desk and write them to it."""
     document, before = _read(path) if path.exists() else ({}, "")
     if "known" in document:
         return read_bench(path)
@@ -107,7 +108,8 @@ def _asked(desk: Desk, name: str, meaning: str) -> dict[str, float]:
 
 
 def parse_known(given: Iterable[str]) -> dict[str, float]:
-    """`NAME=VALUE` texts as a person types them. ModelParameterError names what is unknown or out of bounds."""
+    """Parse `NAME=VALUE` texts as a person types them. Raises ModelParameterError for an unknown name or a value out
+    of bounds."""
     known = {}
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -124,5 +126,5 @@ def parse_known(given: Iterable[str]) -> dict[str, float]:
 
 
 def known_of(rig: Rig, given: Mapping[str, float]) -> dict[str, float]:
-    """`[known]` of a data set recorded on `rig`: what the rig declares, and before it what the person has `given`."""
+    """Return `[known]` of a data set recorded on `rig`: what the rig declares, overridden by what is `given`."""
     return {**rig.known, **given}

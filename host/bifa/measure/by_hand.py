@@ -1,6 +1,6 @@
 """A bench with a lab's own instruments: each trial is announced, recorded, shown, and kept or repeated.
 
-`ByHand` is the `Recorder` of a session with these; sessions then go as on any rig.
+`ByHand` is the `Recorder` of such a session, which otherwise runs as on any rig.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ _LOOK_S = 0.25
 
 
 class ByHand:
-    """The `Recorder` of a rig whose instruments a person works. `plain`: the terminal shows ASCII only; it has so many
-    `columns`; `exports`: says how the instruments write their files, where that is declared; `before` is called before
-    each trial, so that no bar redraws itself over questions and answers."""
+    """The `Recorder` of a rig whose instruments a person operates. `plain`: whether the terminal shows only ASCII;
+    `columns`: its width; `exports()`: how the instruments write their files, where declared. The attribute `before` is
+    called before each trial, so that no progress bar redraws itself over questions and answers."""
 
     def __init__(
         self,
@@ -55,9 +55,9 @@ class ByHand:
         total: int,
         writer: DatasetWriter,
     ) -> Trial:
-        """One trial, as often as the person likes; see session.Recorder.
+        """Record one trial, repeated until the person keeps it; see session.Recorder.
 
-        Raises KeyboardInterrupt where the answer is to stop.
+        Raises KeyboardInterrupt if the answer is a stop.
         """
         self.before()
         turn = Turn(planned, number, total)
@@ -77,7 +77,7 @@ class ByHand:
             except BifaError as error:
                 uno.halt()
                 self._review(bench, uno, turn, f"Not usable: {error}.", "Enter tries again")
-                uno.clear()  # it may have been stopped; the next thing asked is whether valves may switch
+                uno.clear()  # it may have been stopped; the next prompt asks whether valves may switch
                 continue
             if self._accepted(bench, uno, turn, trial, writer):
                 self._instruments.keep(writer.partial / RAW)
@@ -93,7 +93,7 @@ class ByHand:
         return self._review(bench, uno, turn, seen, "Enter keeps it, r repeats it", wrong)
 
     def _review(self, bench: Bench, uno: Uno, turn: Turn, seen: str, choice: str, findings: Sequence[str] = ()) -> bool:
-        """Whether the answer is Enter; the other is to repeat."""
+        """Ask for a decision: True if the answer is Enter, False if it is to repeat."""
         about = turn.as_dict() | {"findings": list(findings)}
         self._desk.ask("review", f"{seen} {choice}, q discards it and stops.", about)
         while True:

@@ -1,8 +1,8 @@
 """The desk at the bench: questions to the person there, and to scripts that watch a folder.
 
-Answers are lines typed at the terminal. With a watched folder, what is asked stands in `next.toml` there as well, and a
-file `answer` (its text is the line; an empty file is Enter) answers it: bifa takes the file away. What was answered
-before a question was asked starts nothing; a stop counts whenever it came.
+Answers are lines typed at the terminal. With a watched folder, each question is also written to `next.toml` there, and
+a file `answer` answers it (its text is the line; an empty file is Enter); bifa deletes that file. Answers given before
+a question was asked are ignored, except for a stop, which counts at any time.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
     from bifa.screen import Countdown
 
 ASKS, ANSWER = "next.toml", "answer"
-_LONGEST = 4096  # of an answer in a file
-STOP = ("q", "quit", "stop", "!")  # in answer to any question, and to none
+_LONGEST = 4096  # bytes of an answer in a file
+STOP = ("q", "quit", "stop", "!")  # accepted at any question, and between questions
 _END = None
 
 
 class NobodyError(BifaError):
-    """There is nobody who could answer."""
+    """No one can answer a question."""
 
 
 class Desk:
-    """`say(text)` shows a line to the person, `countdown` what they wait for; `watch` is the folder for scripts, if
-    there is one. `is_asking`: a question has not been answered yet."""
+    """`say(text)` shows a line to the person, `countdown` shows what they are waiting for; `watch` is the folder for
+    scripts, if there is one. `is_asking`: whether a question is still unanswered."""
 
     def __init__(
         self, say: Callable[[str], None], watch: Path | None = None, countdown: Countdown | None = None
@@ -50,9 +50,9 @@ class Desk:
         self._is_stopped = False
 
     def ask(self, step: str, text: str, about: Mapping[str, Any] | None = None) -> None:
-        """Show `text` and expect an answer to it; an answer to an earlier question does not count, but for a stop.
+        """Ask the question `text`. Answers to earlier questions are discarded, except for a stop.
 
-        `about`: what else a script needs to know, plain values.
+        `about`: further information for scripts, as plain values.
         """
         self._close_countdown()
         if not self._is_listening:
@@ -65,10 +65,9 @@ class Desk:
         self.say(text)
 
     def answer(self) -> str | None:
-        """The line that answers what was asked last, without its ends' blanks; None: not yet. Does not wait.
+        """Return the answer to the last question, stripped, or None if there is none yet. Does not wait.
 
-        Raises KeyboardInterrupt where it is to stop, NobodyError where the terminal's input has ended and no folder is
-        watched.
+        Raises KeyboardInterrupt if the answer is a stop, NobodyError if stdin is closed and no folder is watched.
         """
         text = self._taken()
         if self._is_stopped or (text is not None and _is_stop(text)):
@@ -77,12 +76,12 @@ class Desk:
         return text
 
     def again(self, answer: str, choice: str) -> None:
-        """`answer` does not answer the last question, which still stands: `choice` says what would."""
+        """Reject `answer` and keep the last question open; `choice` says which answers are valid."""
         self.is_asking = True
         self.say(f"{answer!r} is not an answer here: {choice}, q stops.")
 
     def attend(self) -> None:
-        """While nothing is asked: raises KeyboardInterrupt if somebody has asked to stop."""
+        """Raise KeyboardInterrupt if a stop was entered between questions; does nothing while a question is open."""
         if self.is_asking or not self._is_listening:
             return
         self._forget()
@@ -90,7 +89,7 @@ class Desk:
             raise KeyboardInterrupt
 
     def count_down(self, what: str, left_s: float) -> None:
-        """While nothing is asked: `what` the robot does, for `left_s` still."""
+        """Between questions: show `what` the robot is doing, and that it takes `left_s` more."""
         if self._countdown is not None:
             self._countdown.show(what, left_s)
 
@@ -111,7 +110,7 @@ class Desk:
         return line.strip()
 
     def clear(self) -> None:
-        """No question and no countdown stands any more."""
+        """Withdraw the question and the countdown."""
         self._close_countdown()
         if self._watch is not None:
             (self._watch / ASKS).unlink(missing_ok=True)
@@ -121,7 +120,8 @@ class Desk:
             self._countdown.close()
 
     def _forget(self) -> None:
-        """What was typed ahead must not start anything; lines from a pipe were meant for what is to come."""
+        """Discard lines typed ahead at a terminal, which must not start anything, but keep those of a pipe, which are
+        meant for later questions. A stop among the discarded ones is remembered."""
         early = [_from_file(self._watch / ANSWER)] if self._watch is not None else []
         with contextlib.suppress(queue.Empty):
             while sys.stdin is not None and sys.stdin.isatty():
@@ -146,7 +146,7 @@ def _from_file(path: Path) -> str | None:
 
 
 def read_lines(lines: queue.Queue[str | None]) -> None:
-    """Unbuffered, so that nothing is locked when the program ends while this waits."""
+    """Put the lines of stdin into `lines`. Reads unbuffered, so that no lock is held if the program ends meanwhile."""
     try:
         for line in _raw_lines():
             lines.put(line)
@@ -159,7 +159,7 @@ def _raw_lines() -> Iterator[str]:
     rest = b""
     try:
         number = sys.stdin.fileno()
-    except io.UnsupportedOperation:  # what stands for it is no file
+    except io.UnsupportedOperation:  # stdin was replaced by an object without a file descriptor
         yield from (line.rstrip("\n") for line in sys.stdin)
         return
     while block := os.read(number, 4096):

@@ -20,20 +20,20 @@ from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.printable import counted
 
 CHAMBER_OF = {"large": "body", "small": "head"}
-SETTLE_S = 6.0  # of a pressure: five of the slowest time constants of about 1 s
-RELIEF_S = 12.0  # the regulator lets air out more slowly
+SETTLE_S = 6.0  # for a pressure to settle: six of the slowest time constants of about 1 s
+RELIEF_S = 12.0  # for a falling pressure: the regulator releases air more slowly
 
-# The second switch is 5 ms off the sampling grid of the first: together they are known to 5 ms instead of 10.
+# The second switch is 5 ms off the sampling grid of the first: together they are located to 5 ms instead of 10.
 STEP_UP_S, STEP_DOWN_S, STEP_END_S = 0.5, 5.005, 14.0
-MOVED_MM = 0.1  # by which a cross-head has moved: well over its noise
+MOVED_MM = 0.1  # displacement that counts as motion of the cross-head: well above its noise
 STILL_S = 1.0  # kept before and after the motion
-ATTEMPTS = 3  # at a trial in which no telemetry is lost and the clocks line up
+ATTEMPTS = 3  # at recording a trial without lost telemetry and with clocks that can be aligned
 
 SAMPLE_S = 0.01
 TICK_S = 1e-3  # the Uno switches valves at its ticks
 
 Progress = Callable[[float], None]
-Recorded = tuple[dict[str, np.ndarray], dict[str, Any], int]  # columns, what is noted, lost samples
+Recorded = tuple[dict[str, np.ndarray], dict[str, Any], int]  # columns, notes (`extra`), lost samples
 
 
 def record_trial(
@@ -41,9 +41,9 @@ def record_trial(
 ) -> Trial:
     """Run one planned trial and return it as a data set holds it; the valves are off afterwards.
 
-    `extra` notes how well the clocks were lined up (`clock_error_s`), what the regulator was really asked for
-    (`set_point_psi`) and, of a step, when the valves switched.
-    Raises BifaError where telemetry keeps getting lost or the clocks do not line up.
+    `extra` notes how well the clocks were aligned (`clock_error_s`), the actual set-point of the regulator
+    (`set_point_psi`) and, for a step, when the valves switched.
+    Raises BifaError if telemetry is lost, or the clocks cannot be aligned, in all `attempts`.
     """
     why = ""
     for _ in range(attempts):
@@ -56,7 +56,7 @@ def record_trial(
             commanded_psi = uno.get("pressure_psi") if planned.pressure_psi is None else planned.pressure_psi
             return planned.as_trial(columns, extra=extra | set_point(commanded_psi))
         why = f"{lost} samples were lost on the link; check the cable, then resume the session"
-    raise BifaError(f"{planned.title}{f', {attempts} times over' if attempts > 1 else ''}: {why}")
+    raise BifaError(f"{planned.title}{f', {attempts} attempts' if attempts > 1 else ''}: {why}")
 
 
 def _static(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
@@ -71,7 +71,7 @@ def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
     mount(bench, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM, **planned.settings)
     trial = planned.as_trial()
     psi = trial.commanded_psi
-    # Extended first: a head holds with no pressure at all, but it has to snap out for that.
+    # The head is extended first: it anchors even without pressure, but only after snapping out.
     _pressurise(bench, uno, "head", SNAP_PSI)
     if psi != SNAP_PSI:
         _pressurise(bench, uno, "head", psi, RELIEF_S if psi < SNAP_PSI else SETTLE_S)
@@ -82,8 +82,8 @@ def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
 def _moved(
     bench: Bench, uno: Uno, on_progress: Progress, chamber: str, pressure_psi: float, expected_s: float
 ) -> Recorded:
-    """The cross-head's motion, which takes about `expected_s`, on a chamber that is held as `_pressurise` had it;
-    DisturbedError unless it alone was, all the time."""
+    """Record a motion of the cross-head, which takes about `expected_s`, while `chamber` is held as `_pressurise` left
+    it. Raises DisturbedError unless that chamber, and no other, was held throughout."""
     instruments = bench.instruments
     with Recording(bench, uno, on_progress) as tape:
         tape.wait(LEAD_S)
@@ -127,8 +127,8 @@ def _step(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
 
 
 def _walk(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
-    """From rest, for as many cycles as are planned. BifaError where no gait is planned, the robot did not walk through,
-    or the clocks do not line up."""
+    """Record a walk from rest over the planned number of cycles. Raises BifaError if no gait is planned, the walk was
+    interrupted, or the clocks cannot be aligned."""
     if planned.gait is None:
         raise BifaError(f"{planned.title}: a walk needs a gait")
     period_s, cycles = planned.gait.period_s, planned.cycles
@@ -143,7 +143,7 @@ def _walk(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
     known = {
         "switch_error_s": TICK_S / 2,
         "command_age_s": PRESSURES_AFTER_S,
-        "gait_ahead_s": TICK_S,  # the first switches are by the phases after the first step
+        "gait_ahead_s": TICK_S,  # the first switches are decided by the phases after the first step
     }
     extra = noted(tape.clock) | camera_rate(tape.instrument_s) | known
     return _walk_columns(tape, period_s, cycles), extra, tape.lost_samples
@@ -158,12 +158,13 @@ RUNS: dict[str, Callable[[Bench, Uno, PlannedTrial, Progress], Recorded]] = {
 
 
 def noted(clock: ClockLine) -> dict[str, Any]:
-    """What every trial notes of how its clocks were lined up, and of what the Uno does beyond its commands."""
+    """Return what every trial notes: the quality of the clocks' alignment, and the Uno's dead time between supplies."""
     return {"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate, "dead_time_s": DEAD_TIME_S}
 
 
 def set_point(commanded_psi: float) -> dict[str, float]:
-    """What a trial notes of its pressure: the regulator's real set-point. Nothing regulates the vacuum (below 0)."""
+    """Return what a trial notes about its pressure: the regulator's actual set-point. Vacuum (below 0) is not
+    regulated."""
     return {"set_point_psi": round(set_point_psi(commanded_psi), 4)} if commanded_psi >= 0.0 else {}
 
 
@@ -187,8 +188,8 @@ def _pressurise(bench: Bench, uno: Uno, chamber: str, pressure_psi: float, settl
 
 
 def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, float]:
-    """When the positive pressure was switched on, on the Uno's clock, and by how much that may be off: each switch of
-    the schedule happened between two samples, and the two are known to be STEP_DOWN_S - STEP_UP_S apart."""
+    """Time on the Uno's clock at which positive pressure was switched on, and its uncertainty: each of the two switches
+    happened between two samples, and they are known to be STEP_DOWN_S - STEP_UP_S apart."""
     changes = np.flatnonzero(np.diff(np.nan_to_num(command, nan=0.0)) != 0.0) + 1
     if len(changes) != 2:
         raise BifaError(
@@ -201,7 +202,7 @@ def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, flo
 
 
 def _moving_span(tape: Recording) -> slice:
-    """The record about the motion, as far as the Uno recorded as well, without most of the lead on both sides."""
+    """The part of the record around the motion that the Uno covers too, without most of the lead on both sides."""
     time_s, place_mm = tape.instrument_s, tape.record["displacement_mm"]
     begin_s = max(time_s[0] + BEFORE_MARK_S + 0.8 * LEAD_S, tape.pressures_s[0])
     end_s = min(time_s[-1] - 0.5 * LEAD_S, tape.pressures_s[-1])
@@ -217,7 +218,7 @@ def _moving_span(tape: Recording) -> slice:
 
 
 def _machine_columns(tape: Recording, chamber: str, span: slice) -> dict[str, np.ndarray]:
-    """What a testing machine recorded, with the pressure at its own times."""
+    """Columns of a testing machine's record, with the pressure at the machine's own times."""
     time_s = tape.instrument_s[span]
     pressure = tape.pressures_psi[:, CHAMBERS.index(chamber)]
     sampled_s = tape.pressures_s
@@ -232,16 +233,16 @@ def _machine_columns(tape: Recording, chamber: str, span: slice) -> dict[str, np
 
 
 def _walk_columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np.ndarray]:
-    """The Uno's samples while it ran, at the pressures' times since the valves first switched: the displacement then,
-    the commands as they were at the strobe just before."""
+    """Columns of a walk: the Uno's samples while it ran. Times count from the first switching of the valves and are
+    those of the pressures; displacements are interpolated to them, commands date from the strobe just before."""
     runs = np.array([sample.state == "running" for sample in tape.samples])
     # A sample taken in the very tick that starts the run has no command yet.
     running = np.flatnonzero(runs & ~np.isnan(tape.commands).any(axis=1))
     if not len(running):
         raise BifaError("the Uno sent no sample while it ran: check the link's counters with `bifa monitor`")
     refuse_disturbed(tape.samples[np.argmax(runs) :], "running")
-    # The body's phase grows evenly from 0 on. At a strobe it is still what the tick before has switched the valves by:
-    # when it seems to have been 0, the valves switched for the first time.
+    # The body's phase grows evenly from 0. At a strobe it is still the phase by which the tick before switched the
+    # valves, so the time at which it extrapolates to 0 is that of the first switching.
     first = running[0]
     begun_s = tape.uno_s[first] - tape.samples[first].phase_rad[0] / (2 * np.pi) * period_s
     since_s = tape.uno_s[running] - begun_s

@@ -1,11 +1,11 @@
-"""Bring in the record of a lab's own instrument: a file of what it measured, lined up with the Uno's telemetry.
+"""Import the record of a lab's own instrument and align it with the Uno's telemetry.
 
-The instrument's file has times by its own clock and its channels, under the data set's names (`time_s`,
+The instrument's file has its channels and times by its own clock, under the data set's names (`time_s`,
 `displacement_mm`, `force_N`, `displacement_head_mm` ...) or as its export is declared. Beside it lies
-`<name>.sync.csv` with one column `sync_time_s`: when its sync input saw the strobe of D10 rise, by the same clock.
-The instrument is started before `bifa record`: that has the Uno leave out ten strobes and notes which samples these
-were (`strobe` = 0), so that both records show the same pause. Telemetry without that column is lined up by the Uno's
-restart when `bifa record` opened the port: the first edge after that pause is sample 1.
+`<name>.sync.csv` with one column, `sync_time_s`: the times by the same clock at which its sync input saw the strobe
+of D10 rise. The instrument is started before `bifa record`, which has the Uno leave out ten strobes and notes which
+samples these were (`strobe` = 0), so that both records show the same pause. Telemetry without that column is aligned
+by the Uno's restart when `bifa record` opened the port: the first edge after that pause is sample 1.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ Columns = Mapping[str, np.ndarray]
 
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
-_BEYOND = 500.0  # mm or N, of any actuator: 999 of a small unit may well have been measured
+_BEYOND = 500.0  # mm or N, more than any actuator reaches: 999 in a small unit may be a real measurement
 _HEAD, _TAIL = "displacement_head_mm", "displacement_tail_mm"
-_REPAIR = "(a lost marker?); fill the gap by the instrument's own means, or record again"
+_REPAIR = "(a lost marker?); fill the gap with the instrument's own software, or record again"
 _LOST = f"no value {_REPAIR}"
 
 
 class InstrumentFileError(DatasetError):
-    """An instrument's file and the telemetry do not go together; the text says why."""
+    """An instrument's file does not match the telemetry; the text says why."""
 
 
 def import_trial(
@@ -61,13 +61,14 @@ def import_trial(
     add: bool = False,
     export: Export | None = None,
 ) -> tuple[Dataset, ClockLine]:
-    """Write a data set of one trial, `planned`, from an instrument's file and the folder or file of telemetry; or `add`
-    it to the data set that there is, as the next repeat of its condition.
+    """Write a data set of one trial, `planned`, from an instrument's file and a telemetry file or its folder; with
+    `add`, add the trial to the existing data set in `folder` as the next repeat of its condition.
 
-    known: what was measured directly. export: how the instrument writes its files, if declared.
+    known: values that were measured directly. export: how the instrument writes its files, if declared.
 
-    Raises InstrumentFileError where the two do not overlap, their clocks do not line up, or the data set has this
-    record already; DatasetError where a file cannot be used, `folder` exists, or is no data set to be added to.
+    Raises InstrumentFileError if the two records do not overlap, their clocks cannot be aligned, or the data set
+    already has this record; DatasetError if a file cannot be used, or `folder` already exists (with `add`: is not a
+    data set that can be added to).
     """
     recorded = _added_to(folder, known) if add else None
     measured, edges = read_instrument(instrument, CHANNELS[planned.experiment], export)
@@ -92,13 +93,13 @@ def import_trial(
 def _added_to(folder: Path, known: Mapping[str, float] | None) -> Dataset:
     recorded = read_dataset(folder)
     if known and dict(known) != recorded.known:
-        problem = f"[known] has {recorded.known}, --known {dict(known)}: correct [known], or leave --known out"
+        problem = f"[known] has {recorded.known}, but --known gives {dict(known)}: correct [known], or omit --known"
         raise DatasetError(problem, file=str(folder / TABLE_FILE))
     return recorded
 
 
 def _next_repeat(recorded: Dataset, planned: PlannedTrial) -> PlannedTrial:
-    """`planned` under the next number of its condition."""
+    """Return `planned` with the next repeat number of its condition."""
     planned = replace(planned, repeat=1 + recorded.last_repeat(planned.as_trial().condition))
     if (recorded.folder / planned.file).exists():
         raise InstrumentFileError(
@@ -108,20 +109,20 @@ def _next_repeat(recorded: Dataset, planned: PlannedTrial) -> PlannedTrial:
 
 
 def _refuse_copy(recorded: Dataset, trial: Trial, instrument: Path) -> None:
-    """Refuse a record that the data set has already, by what the instrument measured: the pressures are the
-    telemetry's."""
+    """Refuse a record that the data set already has. Only the instrument's own channels are compared; the pressures
+    come from the telemetry."""
     own = {name: values for name, values in trial.columns.items() if name.startswith(("displacement", "force"))}
     for old in recorded.trials:
         if all(name in old.columns and np.array_equal(old.columns[name], values) for name, values in own.items()):
-            raise InstrumentFileError(f"{instrument} is in {recorded.path} already, as {old.file}")
+            raise InstrumentFileError(f"{instrument} is already in {recorded.path}, as {old.file}")
 
 
 def read_instrument(
     path: Path, channels: tuple[str, ...], export: Export | None = None
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Columns of an instrument's file, `time_s` and `channels` among them, and the times of its sync edges [s], from
-    the file beside it or as `export` declares; both rise. A tail that was not tracked at all is no column. `export`:
-    how the file is written; None: under the data set's names. Raises DatasetError."""
+    """Read an instrument's file: its columns, including `time_s` and `channels`, and the times of its sync edges [s],
+    from the file beside it or as `export` declares. Both sets of times increase. A tail that was never tracked gives
+    no column. `export`: how the file is written; None: under the data set's names. Raises DatasetError."""
     optional = (_TAIL,) if _HEAD in channels else ()
     columns, sheet, rows = _read(path, ("time_s", *channels), optional, export or OWN_NAMES)
     if _TAIL in columns and np.isnan(columns[_TAIL]).all():
@@ -130,7 +131,7 @@ def read_instrument(
     _refuse_falling(columns, sheet, rows, "time_s")
     for name in columns.keys() - {"time_s"}:
         called = (export or OWN_NAMES).columns.get(name, name)
-        written = sheet.numbers(sheet.find(called), called)[rows]  # -999 m is none of the codes once it is in mm
+        written = sheet.numbers(sheet.find(called), called)[rows]  # in the file's unit: in mm, -999 m is not a code
         if (coded := codes(written) & (np.abs(columns[name]) > _BEYOND)).any():
             row = int(np.argmax(coded))
             raise sheet.error(f"{written[row]:g} is a code for a missing value {_REPAIR}", rows[row], name)
@@ -153,8 +154,8 @@ def _read(
 def _read_edges(path: Path) -> np.ndarray:
     if not path.exists():
         raise InstrumentFileError(
-            f"{path} is missing: it says when the strobe (D10) rose, in one column, sync_time_s; save it there, or "
-            "declare where else that stands (sync; bifa instrument)"
+            f"{path} is missing: its one column, sync_time_s, holds the times at which the strobe (D10) rose; save it "
+            "there, or declare where else these times are (key sync; bifa instrument)"
         )
     edges, sheet, rows = _read(path, ("sync_time_s",))
     _refuse_gaps(edges, sheet, rows, edges, _LOST)
@@ -163,7 +164,7 @@ def _read_edges(path: Path) -> np.ndarray:
 
 
 def sync_file(path: Path) -> Path:
-    """The file with the strobe's edges that belongs to the record in `path`."""
+    """Return the path of the file with the strobe's edges that belongs to the record in `path`."""
     for name in (f"{path.stem}.sync{path.suffix}", f"{path.stem}.sync.CSV"):
         if path.suffix.lower() == ".csv" and (there := path.with_name(name)).exists():
             return there
@@ -171,7 +172,7 @@ def sync_file(path: Path) -> Path:
 
 
 def _read_telemetry(path: Path, planned: PlannedTrial) -> dict[str, np.ndarray]:
-    """A command is NaN where its chamber is off."""
+    """Columns of the telemetry; a command is NaN while its chamber is off."""
     whole = ("time_s", "sequence", *(f"pressure_{chamber}_psi" for chamber in CHAMBERS))
     wanted = (*whole, *(f"command_{chamber}" for chamber in _commanded(planned)))
     columns, sheet, rows = _read(path, wanted, ("strobe",))
@@ -195,7 +196,7 @@ def _refuse_gaps(columns: Columns, sheet: Sheet, rows: np.ndarray, names: Iterab
 def _refuse_falling(columns: Columns, sheet: Sheet, rows: np.ndarray, name: str) -> None:
     falls = np.diff(columns[name]) <= 0.0
     if falls.any():
-        problem = "not later than the line before; times rise from line to line"
+        problem = "not later than the line before; times must increase from line to line"
         raise sheet.error(problem, rows[np.argmax(falls) + 1], name)
 
 
@@ -204,7 +205,7 @@ def _telemetry_file(path: Path) -> Path:
         return path
     files = sorted(path.glob("telemetry_*.csv"))
     if len(files) != 1:
-        raise InstrumentFileError(f"{path} holds {len(files)} telemetry files: give the one of this trial")
+        raise InstrumentFileError(f"{path} holds {len(files)} telemetry files: give the file of this trial")
     return files[0]
 
 
@@ -219,7 +220,7 @@ def _line_up(edges_s: np.ndarray, uno: dict[str, np.ndarray], instrument: Path, 
 
 
 def _marked(strobe: np.ndarray, sequence: np.ndarray, telemetry: Path) -> int:
-    """The sample whose strobe is the first after those that were left out."""
+    """Number of the sample whose strobe is the first after the omitted ones."""
     ends = np.flatnonzero(np.diff(strobe) > 0)
     if len(ends) != 1 or sequence[ends[0] + 1] != sequence[ends[0]] + 1:
         raise InstrumentFileError(
@@ -230,7 +231,7 @@ def _marked(strobe: np.ndarray, sequence: np.ndarray, telemetry: Path) -> int:
 
 
 def _assemble(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
-    """The trial's columns, of records that are both on the Uno's clock."""
+    """Columns of the trial, from two records that are both on the Uno's clock."""
     overlap = (measured["time_s"] >= uno["time_s"][0]) & (measured["time_s"] <= uno["time_s"][-1])
     if overlap.sum() < 3:
         raise InstrumentFileError(f"{instrument} and the telemetry do not overlap in time")
@@ -248,7 +249,7 @@ def _machine(
         raise InstrumentFileError(f"{instrument}: nothing moved while the Uno recorded")
     first, last = instrument_s[moved][0] - _MARGIN_S, instrument_s[moved][-1] + _MARGIN_S
     keep = overlap & (instrument_s >= first) & (instrument_s <= last)
-    chamber = CHAMBER_OF.get(planned.actuator or "", "head")  # a pull has no actuator: it is of the head
+    chamber = CHAMBER_OF.get(planned.actuator or "", "head")  # a pull has no actuator: it tests the head
     time_s = instrument_s[keep]
     _refuse_silence(uno["time_s"], time_s)
     return {
@@ -265,7 +266,7 @@ def _camera(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: 
     chambers = _commanded(planned)
     commands = np.array([uno[f"command_{chamber}"] for chamber in chambers])
     keep = np.isfinite(commands).all(axis=0) & (uno["time_s"] <= instrument_s[-1])
-    if step:  # which rests under vacuum first; a walk that was filmed from its middle on does not begin at rest
+    if step:  # a step rests under vacuum first; a walk filmed only from its middle on would not begin at rest
         keep &= uno["time_s"] >= instrument_s[0]
     if not keep.any():
         raise InstrumentFileError(f"{instrument} does not cover the time in which the valves were commanded")
@@ -286,12 +287,12 @@ def _camera(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: 
 
 
 def _refuse_silence(uno_s: np.ndarray, time_s: np.ndarray) -> None:
-    """Refuse a trial within which samples of the Uno were lost."""
+    """Refuse a trial during which samples of the Uno were lost."""
     steps = np.diff(uno_s)
     silent = np.flatnonzero((steps > LONGEST_GAP_S) & (uno_s[1:] > time_s[0]) & (uno_s[:-1] < time_s[-1]))
     if len(silent):
         worst = silent[np.argmax(steps[silent])]
         raise InstrumentFileError(
-            f"the telemetry has a hole of {steps[worst]:.2f} s at {uno_s[worst]:.2f} s on the Uno's clock, within the "
+            f"the telemetry has a gap of {steps[worst]:.2f} s at {uno_s[worst]:.2f} s on the Uno's clock, within the "
             "trial: samples were lost on the link; check the cable, and record again"
         )

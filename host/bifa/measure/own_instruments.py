@@ -1,8 +1,8 @@
-"""A lab's own instruments as files: the person is told what to mount and start; the file that appears is the record.
+"""A lab's own instruments, operated by a person: prompts say what to mount and start, and the saved file is the record.
 
-It has `time_s` and the channels under the data set's names, or is written as declared; `<name>.sync.csv` beside it has
-`sync_time_s`, the rising edges of the strobe that its sync input saw, unless the declaration has them elsewhere. It
-appears in the watched folder or below it, or its path is typed. Files that cannot be used are named.
+The file has `time_s` and the channels under the data set's names, or is written as declared. `<name>.sync.csv` beside
+it has `sync_time_s`, the rising edges of the strobe at the instrument's sync input, unless the declaration puts them
+elsewhere. The file appears in or below the watched folder, or its path is typed. Unusable files are reported.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ Signature = tuple[Any, ...]
 _Record = tuple[Path, dict[str, np.ndarray]]
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".tra", ".lvm", ".dat", ".asc")
-SETTLED_S = 0.5  # during which a file's size and time stay the same
-_READ_S = 0.3  # that a file is read for before others have their turn: the Uno vents unless its host is heard in 2 s
+SETTLED_S = 0.5  # a file whose size and time stay the same for so long is complete
+_READ_S = 0.3  # longest wait for a file being read: the Uno vents if it does not hear from its host for 2 s
 
 _STAND = {
     "static_loading": "the {actuator} actuator in the testing machine, contracted",
@@ -45,14 +45,14 @@ _STAND = {
 
 @dataclass(frozen=True)
 class Turn:
-    """Which trial is being recorded: `number` of `total`."""
+    """The trial being recorded: `number` of `total`."""
 
     planned: PlannedTrial
     number: int
     total: int
 
     def as_dict(self) -> dict[str, Any]:
-        """The trial for `next.toml`, as plain values."""
+        """Return the trial as plain values for `next.toml`."""
         planned, trial = self.planned, self.planned.as_trial()
         settings: dict[str, Any] = {
             "actuator": planned.actuator,
@@ -72,8 +72,8 @@ class Turn:
 
 
 class OwnInstruments:
-    """`AskedInstruments` that are worked by whoever is at `desk`; `watch` is the folder of their files, if any;
-    `exports()` says how these are written, and is asked again while a record is waited for."""
+    """`AskedInstruments` operated by the person at `desk`. `watch`: the folder where their files appear, if any.
+    `exports()` returns how the files are written; it is called again while waiting for a record."""
 
     def __init__(
         self, desk: Desk, watch: Path | None = None, exports: Callable[[], Mapping[str, Export]] = dict
@@ -83,7 +83,7 @@ class OwnInstruments:
         self._before: dict[Path, Signature] = {}
         self._wrong = ""
         self._told: dict[Path, Signature] = {}
-        self._turn: Turn  # as `begin` is told, and the folder
+        self._turn: Turn  # this and `_kept` are set by `begin`
         self._kept: Path
         self._step = ""
         self._experiment = ""
@@ -94,7 +94,7 @@ class OwnInstruments:
         self._reading: futures.Future[_Record] | None = None
 
     def begin(self, turn: Turn, kept: Path) -> None:
-        """What is asked from now on is for this trial; `kept`: the folder of the earlier trials' files."""
+        """Begin a trial, to which all further prompts refer. `kept`: the folder with the files of earlier trials."""
         self._turn, self._kept = turn, kept
 
     def mount(self, experiment: str, **settings: Any) -> None:
@@ -114,7 +114,7 @@ class OwnInstruments:
         """See Instruments."""
         self._known, self._told = dict(self._signatures()), dict(self._alone())
         self._before = dict(self._known)
-        machine = ROLES[self._experiment] == MACHINE  # which moves and measures, and not a camera
+        machine = ROLES[self._experiment] == MACHINE  # a testing machine, which moves and measures, not a camera
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
         self._ask(
             "start", f"Start {which}, with the strobe (D10) on its sync input. Press Enter once it is recording{then}."
@@ -129,12 +129,13 @@ class OwnInstruments:
 
     @property
     def moving(self) -> bool:
-        """See Instruments: until that is said, or the record is there already."""
+        """See Instruments. True until the person confirms the end of the motion or the record has appeared."""
         return not self.ready
 
     @property
     def ready(self) -> bool:
-        """See AskedInstruments. Raises KeyboardInterrupt where the answer is to stop; no other word starts anything."""
+        """See AskedInstruments. Raises KeyboardInterrupt if the answer is a stop. If Enter is expected, any other text
+        is rejected."""
         if self._reading is not None:
             return self._taken()
         if self._step in ("move", "save") and self._watch is not None and self._take_new():
@@ -177,11 +178,11 @@ class OwnInstruments:
         self._ask("save", f"Valves are off. Stop the recording and save it {where}as {what}{sync}{then}.")
 
     def stop(self) -> dict[str, np.ndarray]:
-        """See Instruments; {} where the recording was broken off."""
+        """See Instruments; {} if the recording was aborted."""
         return dict(self._record[1]) if self._record else {}
 
     def keep(self, folder: Path) -> None:
-        """Copy the files of the last record into `folder`, as they came, under the trial's name."""
+        """Copy the files of the last record unchanged into `folder`, under the trial's name."""
         if self._record is None:
             return
         folder.mkdir(parents=True, exist_ok=True)
@@ -192,7 +193,7 @@ class OwnInstruments:
 
     @property
     def _export(self) -> Export | None:
-        """How the instrument of this experiment writes its files."""
+        """Declared file format of this experiment's instrument; None if not declared."""
         return self._declared.get(ROLES[self._experiment])
 
     @property
@@ -204,25 +205,25 @@ class OwnInstruments:
         self._desk.ask(step, text, self._turn.as_dict())
 
     def _files(self) -> list[Path]:
-        """What lies in the watched folder and below, without what is bifa's or an operating system's."""
+        """Files in and below the watched folder, except bifa's own and the operating system's."""
         if self._watch is None:
             return []
         found = (path for path in self._watch.rglob("*") if path.name not in (ASKS, ANSWER))
         return sorted(path for path in found if not is_stray(path.name) and path.is_file())
 
     def _signatures(self) -> Iterator[tuple[Path, Signature]]:
-        """Records with all that belongs to them."""
+        """Complete records: files whose sync file, if needed, exists as well."""
         for path in self._files():
             if not _is_sync(path) and path.suffix.lower() in self._suffixes:
                 sync = sync_file(path)
                 if self._needs_sync_file and not sync.exists():
                     continue
-                with contextlib.suppress(FileNotFoundError):  # gone meanwhile
+                with contextlib.suppress(FileNotFoundError):  # deleted meanwhile
                     parts = (path, sync) if self._needs_sync_file else (path,)
                     yield path, tuple(_signature(part) for part in parts)
 
     def _alone(self) -> Iterator[tuple[Path, Signature]]:
-        """Files that do not make a record yet, or never will."""
+        """Files that are not, or not yet, part of a complete record."""
         whole = {path for path, _ in self._signatures()}
         whole |= {sync_file(path) for path in whole}
         for path in self._files():
@@ -232,20 +233,20 @@ class OwnInstruments:
 
     @property
     def _suffixes(self) -> tuple[str, ...]:
-        """What the name of a record may end with."""
+        """Suffixes that a record's name may have."""
         if self._export is None:
             return (".csv",)
         return (".xlsx",) if self._export.form.format == "xlsx" else TEXT_SUFFIXES
 
     def _tell_of_others(self) -> None:
-        """Name files that have appeared and cannot be used, once for each version of them."""
+        """Report new files that cannot be used, once for each version of a file."""
         for path, signature in self._alone():
             if self._told.get(path) != signature and self._is_settled(path, signature):
                 self._told[path] = signature
                 self._desk.say(self._why_not(path))
 
     def _is_settled(self, path: Path, signature: Signature) -> bool:
-        """Whether a file has been the same for long enough to have been written to its end."""
+        """Whether a file has stayed unchanged for long enough to be complete."""
         before, since_s = self._seen.get(path, (None, 0.0))
         if before != signature:
             self._seen[path] = (signature, time.monotonic())
@@ -254,19 +255,18 @@ class OwnInstruments:
 
     def _why_not(self, path: Path) -> str:
         if _is_sync(path):
-            return f"{path} is there; the record that it belongs to is not, yet: save that, too."
+            return f"Found {path}, but not yet the record that it belongs to: save that, too."
         if path.suffix.lower() in self._suffixes:
-            return f"{path} is there; {sync_file(path).name} (sync_time_s), beside it, is not, yet: save that, too."
+            return f"Found {path}, but not yet {sync_file(path).name} (sync_time_s) beside it: save that, too."
         role = ROLES[self._experiment]
         kinds = ", ".join(self._suffixes)
         return (
-            f"{path} is there, but a record of the {role} ends with {kinds}: save it as such, or declare with "
-            f"`{shlex.join(['bifa', 'instrument', str(path)])}` how the {role} writes its files."
+            f"Found {path}, but a record of the {role} ends with {kinds}: save it in that format, or declare how the "
+            f"{role} writes its files with `{shlex.join(['bifa', 'instrument', str(path)])}`."
         )
 
     def _take_new(self) -> bool:
-        """Take the file that has appeared since the start, once it is complete; one that cannot be used is named
-        once."""
+        """Take a file that has appeared since the start, once it is complete; report an unusable one once."""
         self._take_correction()
         self._tell_of_others()
         for path, signature in self._signatures():
@@ -276,7 +276,7 @@ class OwnInstruments:
         return False
 
     def _take_correction(self) -> None:
-        """If the declaration was corrected while its file waits, look at the file again."""
+        """If the declaration was corrected in the meantime, consider the files again."""
         try:
             declared = self._exports()
         except BifaError as error:
@@ -289,12 +289,12 @@ class OwnInstruments:
 
     def _take_named(self, answer: str) -> bool:
         if not answer and self._watch is not None:
-            return False  # it is looked for anyway
+            return False  # the watched folder is searched anyway
         path = Path(answer.strip("'\""))
         try:
             path = path.expanduser()
             there = path.is_file()
-        except (OSError, RuntimeError, ValueError):  # too long a name, a user who is not known
+        except (OSError, RuntimeError, ValueError):  # the name is too long, or ~user unknown
             there = False
         if not answer or not there:
             self._desk.say(f"There is no file {answer!r}. Type the path of the record, or q to stop.")
@@ -311,7 +311,7 @@ class OwnInstruments:
         return path, {**columns, "sync_time_s": edges}
 
     def _taken(self) -> bool:
-        """Whether what is being read is the record, which a workbook may take many seconds to tell."""
+        """Whether the file being read has turned out to be the record; reading a workbook may take many seconds."""
         assert self._reading is not None
         try:
             self._record = self._reading.result(_READ_S)
@@ -325,7 +325,7 @@ class OwnInstruments:
         return True
 
     def _refuse_earlier(self, path: Path) -> None:
-        """Refuse the file of an earlier trial: somebody saved or named the wrong one."""
+        """Refuse the file of an earlier trial, which was saved or named by mistake."""
         data, own = path.read_bytes(), Path(self._turn.planned.file).stem
         for old in sorted(self._kept.glob("*")):
             if old.stem != own and not _is_sync(old) and old.is_file() and old.read_bytes() == data:
@@ -337,6 +337,6 @@ def _is_sync(path: Path) -> bool:
 
 
 def _signature(path: Path) -> tuple[int, int]:
-    """What changes while a file is written."""
+    """Modification time and size, which change while a file is written."""
     stat = path.stat()
     return stat.st_mtime_ns, stat.st_size

@@ -1,4 +1,4 @@
-"""What a session at the bench consists of (paper, section IV): which trials, at which pressures, how often."""
+"""The plan of a session at the bench (paper, section IV): which trials, at which pressures, how often."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ STATIC_RATE_MM_S = 2.0
 PULL_RATE_MM_S = 20.0  # paper, IV.B
 PULL_MM = 40.0
 SNAP_PSI = 8.5  # extends every actuator
-EXTENDED = {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}  # noted of a pull, whose head is extended first
+EXTENDED = {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}  # noted for a pull, whose head is extended first
 
-# Two more gaits, with other phases and unequal duties, so that a walk is not one point in the space of gaits.
+# Two more gaits, with other phases and unequal duties, so that the walks are not all at one point of the gait space.
 BRISK = Gait(3.4, 208.9, 331.9, 0.65, 0.44, 0.44)
 AMBLE = Gait(4.4, 240.0, 60.0, 0.56, 0.5, 0.5)
 
 
 @dataclass(frozen=True)
 class PlannedTrial:
-    """One recording to be made. `settings` goes to the stand (`inclination_deg`, `direction`); `parameters` are sent to
-    the Uno with the gait (`coupling_per_s`, `pressure_psi`); `name`: what the file is called, if not by the condition.
-    """
+    """One recording to be made. `settings` go to the stand (`inclination_deg`, `direction`); `parameters` are sent to
+    the Uno with the gait (`coupling_per_s`, `pressure_psi`); `name` is the stem of the file's name, if not made from
+    the condition."""
 
     experiment: str
     actuator: str | None = None
@@ -46,7 +46,7 @@ class PlannedTrial:
 
     @property
     def file(self) -> str:
-        """A name that tells the condition, static_large_4psi_2mm_s_1.csv, or baseline_1.csv."""
+        """File name, made from the condition (static_large_4psi_2mm_s_1.csv) or from `name` (baseline_1.csv)."""
         if self.name:
             return f"{self.name}_{self.repeat}.csv"
         parts = [self.experiment.split("_")[0]]
@@ -64,11 +64,11 @@ class PlannedTrial:
 
     @property
     def title(self) -> str:
-        """What it is called on the terminal: "static loading, large, 4 psi, 2 mm/s, repeat 1"."""
+        """Title for the terminal: "static loading, large, 4 psi, 2 mm/s, repeat 1"."""
         return f"{self.as_trial().label}, repeat {self.repeat}"
 
     def as_trial(self, columns: Mapping[str, Any] | None = None, **fields: Any) -> Trial:
-        """The trial that this becomes once it is recorded."""
+        """Return the `Trial` that this becomes once recorded."""
         with_gait = {key: self.parameters[key] for key in GAIT_OPTIONAL if key in self.parameters}
         return Trial(
             file=self.file,
@@ -85,7 +85,7 @@ class PlannedTrial:
 
 
 def walks(file: GaitFile, repeats: int, **fields: Any) -> tuple[PlannedTrial, ...]:
-    """Walks of a gait file's gait, with the other parameters that it holds; `fields`: of PlannedTrial."""
+    """Plan walks with a gait file's gait and its other parameters; `fields` are passed to PlannedTrial."""
     pressure_psi = file.others.get("pressure_psi")
     walk = PlannedTrial("locomotion", None, pressure_psi, gait=file.gait, parameters=file.others, **fields)
     return tuple(replace(walk, repeat=repeat) for repeat in range(1, repeats + 1))
@@ -103,12 +103,12 @@ def session(
     settings: Mapping[str, Any] | None = None,
     quick: bool = False,
 ) -> tuple[PlannedTrial, ...]:
-    """The trials of a session, in the order in which they are run.
+    """Return the trials of a session in the order in which they are run, 45 by default.
 
-    45 of them by default. All conditions are gone through once, then again, so that the repeats of a condition are
-    spread over the day and a drift shows between them. `quick`: the same conditions, since a verdict rests on those
-    that are never fitted, but twice instead of three times, with faster cross-heads and shorter walks; `repeats` and
-    `cycles`, where given, win. At 0 psi nothing walks; where no pressure is given, walks have the Uno's own.
+    All conditions are run once, then all of them again, so that the repeats of a condition are spread over the day and
+    show a drift. `quick`: the same conditions, since a verdict rests on the held-out ones, but two repeats instead of
+    three, faster cross-heads and shorter walks; `repeats` and `cycles` take precedence if given. Pressures of 0 and
+    below are skipped for walks; without a given pressure, walks use the Uno's own.
     """
     repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
     cycles = cycles or (QUICK_CYCLES if quick else CYCLES)

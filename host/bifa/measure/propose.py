@@ -1,6 +1,6 @@
-"""A look at one export: how it seems to be written, which preset reads it, and which column may be what.
+"""Inspect an export: how it seems to be written, which preset reads it, and what each column may hold.
 
-What is found here is proposed to a person, who decides; nothing is read by it unasked.
+The findings are proposals for a person to decide on; nothing is read by them without confirmation.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from bifa.measure.instruments import CHANNELS
 from lacuna.decimals import number
 
 ROWS_SHOWN = 3
-_LOOKED_AT = 400  # lines
+_LOOKED_AT = 400  # lines that are inspected
 _MOST_BYTES = 1 << 18
 _MOST_HEADS = 6
 _MAY_HAVE = ("time_s", "displacement_mm", "displacement_head_mm", "force_N")
-_MEANS = {  # what a column may be called, in the languages of the presets
+_MEANS = {  # names that a column may have, in the languages of the presets
     "time_s": r"time|zeit|temps|millis|micros|stamp|frame|x_value|^t$",
     "displacement": r"displ|exten|stroke|posi|weg|verl|course|cross|^x$|/ x$| x$",
     "force": r"force|load|kraft|last|charge",
@@ -37,49 +37,49 @@ _MEANS = {  # what a column may be called, in the languages of the presets
 
 @dataclass(frozen=True)
 class Look:
-    """What was seen in a file: how it is written (the keys of a declaration that differ from the usual), its sheet, and
-    the presets that read it, by role."""
+    """Result of inspecting a file: how it is written (the keys of a declaration that differ from the defaults), its
+    sheet, and the presets that read it, by role."""
 
     how: Mapping[str, Any]
     sheet: Sheet
     presets: Mapping[str, str]
 
     def rows(self) -> list[list[str]]:
-        """The first rows, as they were written."""
+        """Return the first rows as written in the file."""
         columns = [self.sheet.cells(place)[:ROWS_SHOWN] for place in range(len(self.sheet.names))]
         return [list(row) for row in zip(*columns, strict=True)]
 
     def guess(self, name: str) -> str | None:
-        """The column that may be `name` of the data set."""
+        """Guess which column may be `name` of the data set; None if no name fits."""
         kind = "time_s" if name == "time_s" else name.split("_")[0]
         found = [label for label in self.sheet.labels() if re.search(_MEANS[kind], label, re.IGNORECASE)]
         return found[0] if found else None
 
     def unit(self, name: str, column: str) -> str | None:
-        """The unit that the file itself gives for a column, if it may be that of `name`."""
+        """Return the unit that the file itself gives for a column, if it is a possible unit of `name`."""
         place = self.sheet.find(column)
         told = unit_in_file(self.sheet, place)
         return told if told in units_for(name) else None
 
 
 def wanted(role: str) -> list[str]:
-    """The columns that an instrument of this role records, over all its experiments."""
+    """Return the columns that an instrument of this role records, over all its experiments."""
     names = [name for experiment, channels in CHANNELS.items() if ROLES[experiment] == role for name in channels]
     return ["time_s", *dict.fromkeys(names)]
 
 
 def look(path: Path) -> Look:
-    """Raises DatasetError where the file is no table at all."""
+    """Inspect the file at `path`. Raises DatasetError if it does not contain a table."""
     how = _workbook(path) if path.suffix.lower() == ".xlsx" else _text(path)
     form = SheetForm(**{**how, "separator": SEPARATORS.get(how.get("separator", "comma"), ",")})
     return Look(how, Sheet(path, form), {role: name for role in ("machine", "camera") if (name := _preset(path, role))})
 
 
 def declaration(role: str, table: Mapping[str, Any]) -> str:
-    """As it stands in a bench's file."""
+    """Return the TOML text of a declaration, as in a bench's file."""
     lines = [f"[instrument.{role}]"]
     for key, value in table.items():
-        if isinstance(value, Mapping):  # a table in one line, as people write it
+        if isinstance(value, Mapping):  # an inline table, as people write it
             pairs = [tomli_w.dumps({name: one}).strip() for name, one in value.items()]
             lines.append(f"{key} = {{ {', '.join(pairs)} }}")
         else:
@@ -88,7 +88,7 @@ def declaration(role: str, table: Mapping[str, Any]) -> str:
 
 
 def parsed(role: str, table: Mapping[str, Any]) -> Export:
-    """The declaration, checked; DatasetError."""
+    """Return the checked declaration. Raises DatasetError if it is invalid."""
     source = Source("", 0, "the declaration")
     return parse_exports(Fields({role: dict(table)}, source, table="instrument"), source)[role]
 
@@ -111,7 +111,7 @@ def _text(path: Path) -> dict[str, Any]:
         for decimal in (".", ","):
             if decimal != mark and (found := _numbers(rows, decimal))[0]:
                 run, first = found
-                share = _share_of_numbers(rows[first], decimal)  # "0,5;1,5" at its commas: two of three
+                share = _share_of_numbers(rows[first], decimal)  # "0,5;1,5" split at commas: two of three are numbers
                 best = max(best, (run, share, -first, name, decimal), key=lambda one: one[:3])
     run, first, separator, decimal = best[0], -best[2], *best[3:]
     _refuse_short(path, run)
@@ -123,7 +123,7 @@ def _text(path: Path) -> dict[str, Any]:
 
 def _refuse_short(path: Path, run: int) -> None:
     if run < 2:
-        problem = "holds no rows of numbers that belong together: is it the export of a table?"
+        problem = "contains no table of numbers (consecutive rows of equal length): is it an export of a table?"
         raise DatasetError(problem, file=str(path))
 
 
@@ -138,7 +138,7 @@ def _decoded(path: Path) -> tuple[str, list[str]]:
 
 
 def _is_utf8(raw: bytes) -> bool:
-    is_whole = len(raw) < _MOST_BYTES  # else it may be cut within a character
+    is_whole = len(raw) < _MOST_BYTES  # otherwise it may be cut within a character
     try:
         codecs.getincrementaldecoder("utf-8")().decode(raw, final=is_whole)
     except UnicodeDecodeError:
@@ -156,7 +156,7 @@ def _split(line: str, mark: str) -> list[str]:
 
 
 def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
-    """Length and first line of the longest run of rows with as many cells, numbers most of them."""
+    """Length and first line of the longest run of rows with equally many cells, most of them numbers."""
     longest, first, run, width = 0, 0, 0, 0
     for place, cells in enumerate(rows):
         here = len(cells) if len(cells) > 1 and _share_of_numbers(cells, decimal) > 0.5 else 0
@@ -168,20 +168,20 @@ def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
 
 
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
-    """Of the cells that are not empty; 0 where there are not two."""
+    """Share of numbers among the non-empty cells; 0 if there are fewer than two."""
     written = [cell for cell in cells if cell.strip()]
     found = [number(cell if decimal == "." else cell.replace(".", " ").replace(",", ".")) for cell in written]
     return sum(value is not None for value in found) / len(written) if len(written) > 1 else 0.0
 
 
 def _heads(above: Sequence[Sequence[str]], width: int) -> dict[str, Any]:
-    """The rows of names, and of units, right above the numbers."""
+    """Keys that declare the rows of names, and of units, right above the numbers."""
     heads: list[Sequence[str]] = []
     for row in reversed(above):
         if not 1 < len(row) <= width + 1 or not any(cell.strip() for cell in row) or len(heads) == _MOST_HEADS:
             break
         if row[0].strip() and heads and heads[0][0].strip() and not _is_of_units(heads[0]):
-            break  # a line of the preamble, above one that names its first column
+            break  # a line of the preamble, since the row below already names the first column
         heads.insert(0, row)
     units = int(bool(heads) and len(heads) > 1 and _is_of_units(heads[-1]))
     names = heads[: len(heads) - units]
@@ -204,7 +204,7 @@ def _is_of_units(row: Sequence[str]) -> bool:
 
 
 def _preset(path: Path, role: str) -> str | None:
-    """The first preset that finds its columns in the file."""
+    """Name of the first preset whose columns are in the file."""
     for name in presets():
         try:
             export = parsed(role, {"preset": name})

@@ -18,19 +18,20 @@ from bifa.rig import Rig
 
 LEAD_S = 0.3  # recorded before and after, so that the clocks are known on both sides
 _PIECE_S = 0.25
-BEFORE_MARK_S = 0.1  # that the instrument surely sees strobes before the pause
+BEFORE_MARK_S = 0.1  # ensures that the instrument sees strobes before the pause
 
 
 @dataclass(frozen=True)
 class Bench:
-    """What a trial is recorded on: the stand with its instruments, and the clock in whose time they and the Uno run."""
+    """The bench that a trial is recorded on: the stand with its instruments, and the clock that paces them and the
+    Uno."""
 
     instruments: Instruments
     clock: Clock
 
 
 def bench_of(rig: Rig) -> Bench:
-    """The bench that a rig brings; BifaError where it has no instruments."""
+    """Return the bench of a rig. Raises BifaError if it has no instruments."""
     if rig.instruments is None:
         raise BifaError(
             "this port has no instruments: use `--port virtual`, or record with your own and give their file "
@@ -40,14 +41,14 @@ def bench_of(rig: Rig) -> Bench:
 
 
 def mount(bench: Bench, uno: Uno, experiment: str, **settings: Any) -> None:
-    """Have `experiment` put on the stand, and wait until it is there."""
+    """Have `experiment` set up on the stand, and wait until this is done."""
     bench.instruments.mount(experiment, **settings)
     until_ready(bench.instruments, lambda: idle(bench, uno, _PIECE_S))
 
 
 def idle(bench: Bench, uno: Uno, duration_s: float, doing: str = "") -> None:
-    """Let time pass, and the Uno know that the host is alive; `doing`: what the robot does meanwhile, for whoever
-    works the instruments."""
+    """Let time pass while keeping the Uno informed that the host is alive. `doing`: what the robot does meanwhile,
+    shown to whoever operates the instruments."""
     until_s = bench.clock.now() + duration_s
     while (left_s := until_s - bench.clock.now()) > 0:
         attend(bench.instruments, doing, left_s)
@@ -59,10 +60,10 @@ class Recording:
     """A context manager: the instrument and the Uno's stream run inside it; afterwards the valves are off. The Uno
     marks its strobe at the beginning, so that both sides number the samples alike.
 
-    `samples`: the Uno's own. When it has ended well: `commands` and `pressures_psi` (n, 3) of body, head and tail;
-    `uno_s` (n,) the Uno's times of the commands, `pressures_s` (n,) of the pressures; `record` what the instrument
-    measured; `instrument_s` its times on the Uno's clock; `clock` how the two were lined up; `lost_samples`.
-    AlignmentError where they cannot be.
+    `samples` are the Uno's. After a normal exit there are also `commands` and `pressures_psi` (n, 3) of body, head and
+    tail; `uno_s` (n,) and `pressures_s` (n,), the times of commands and of pressures on the Uno's clock; `record`, the
+    instrument's channels; `instrument_s`, its times on the Uno's clock; `clock`, the alignment of the two clocks; and
+    `lost_samples`. The exit raises AlignmentError if the clocks cannot be aligned.
     """
 
     def __init__(self, bench: Bench, uno: Uno, on_progress: Callable[[float], None] = lambda share: None) -> None:
@@ -71,7 +72,7 @@ class Recording:
         self.samples: list[Any] = []
 
     def __enter__(self) -> Recording:
-        self._uno.taken_samples()  # what is left of an earlier recording
+        self._uno.taken_samples()  # discard the rest of an earlier recording
         self._uno.stream(True)
         self._instruments.start()
         until_ready(self._instruments, lambda: self.wait(_PIECE_S, report=False))
@@ -90,7 +91,7 @@ class Recording:
             self._line_up()
 
     def wait(self, duration_s: float, report: bool = True, doing: str = "") -> None:
-        """Let `duration_s` pass, and keep what the Uno says meanwhile; report: how far that is, as progress;
+        """Let `duration_s` pass and keep the Uno's samples. `report`: whether to report the elapsed share as progress;
         `doing`: as in `idle`."""
         begun_s = self._clock.now()
         while (left_s := begun_s + duration_s - self._clock.now()) > 0:
@@ -100,8 +101,8 @@ class Recording:
                 self._on_progress(1.0 - max(left_s, 0.0) / duration_s)
 
     def wait_while(self, condition: Callable[[], bool], expected_s: float) -> None:
-        """Wait for as long as `condition()` holds, about `expected_s`; BifaError after three times as long, unless
-        it is a person who moves things."""
+        """Wait while `condition()` holds, about `expected_s`. Raises BifaError after three times as long plus 5 s,
+        unless a person operates the instruments."""
         begun_s = self._clock.now()
         while condition():
             self.samples += self._uno.samples(_PIECE_S)

@@ -1,7 +1,7 @@
-"""A session at the bench: the planned trials one after the other into a data set that grows on disk.
+"""A session at the bench: record the planned trials one by one into a data set that grows on disk.
 
-An interrupted session goes on where it was; a finished data set is never written over; whatever happens, the valves
-are off when it ends.
+An interrupted session can be resumed; a finished data set is never overwritten; however a session ends, the valves
+are off afterwards.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from bifa.rig import Rig
 
 @dataclass(frozen=True)
 class Event:
-    """How a session is getting on: trial `number` of `total`, `share` of it done; once it is, the `trial`, what the
-    `link` has been through meanwhile, and what is wrong with the displacement's lag compared with the earlier trials'
-    (`misfit`)."""
+    """Progress of a session: `share` of trial `number` of `total` is done. For a finished trial also the `trial`, the
+    `link` counters over its duration, and a description of its displacement's lag if that does not match the earlier
+    trials (`misfit`)."""
 
     planned: PlannedTrial
     number: int
@@ -41,7 +41,7 @@ class Event:
 
 
 class Recorder(Protocol):
-    """Records one planned trial, `number` of `total`, for the data set that `writer` grows."""
+    """Records one planned trial, `number` of `total`, for the data set that `writer` is writing."""
 
     def __call__(
         self,
@@ -57,7 +57,7 @@ class Recorder(Protocol):
 
 
 def unattended(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
-    """The `Recorder` of a rig whose instruments need nobody."""
+    """The `Recorder` of a rig whose instruments run unattended."""
     return record_trial(bench_of(rig), uno, planned, on_progress)
 
 
@@ -72,11 +72,11 @@ def run_session(
     record: Recorder | None = None,
     on_event: Callable[[Event], None] = lambda event: None,
 ) -> Dataset:
-    """Record `trials` on `rig` into `folder`; those that an interrupted session already has are skipped. `record`:
-    None where the rig's instruments need nobody.
+    """Record `trials` on `rig` into `folder`, skipping those that an interrupted session has already recorded.
+    `record`: None if the rig's instruments run unattended.
 
-    Raises DatasetError where `folder` is a finished data set, or an unfinished one of another session or with other
-    `options` in its provenance; LockedError where somebody else is recording into it.
+    Raises DatasetError if `folder` is a finished data set, or an unfinished one of another session or with other
+    `options` in its provenance; LockedError if another process is recording into it.
     """
     with locked(folder):
         with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
@@ -102,8 +102,8 @@ def run_session(
 
 
 def refuse_other_settings(writer: DatasetWriter, provenance: Mapping[str, Any]) -> None:
-    """DatasetError where the trials that an interrupted session has left were made with other options: two conditions
-    in one data set, of which its provenance would name the first."""
+    """Raise DatasetError if the trials left by an interrupted session were recorded with other options: the data set
+    would mix both, but its provenance would name only the first."""
     if not writer.trials:
         return
     old, new = (_settings(of) for of in (writer.provenance, provenance))
@@ -120,12 +120,12 @@ def refuse_other_settings(writer: DatasetWriter, provenance: Mapping[str, Any]) 
 
 
 def _settings(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """What decides a session's data. Which port a robot is at does not; whether it is a virtual one does."""
+    """The settings that affect a session's data: the options and whether the robot is virtual, but not its port."""
     return {"virtual": provenance.get("port") == "virtual"} | dict(provenance.get("options", {}))
 
 
 def provenance(command: str, port: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Who made a data set, with what: for the reader of the file."""
+    """Return the provenance of a data set: command and version, time, port and options."""
     return {
         "recorded_by": f"{command} {bifa.__version__}",
         "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -1,4 +1,4 @@
-"""A trial as a small plot in text, to see at the bench whether what came is what was meant."""
+"""Small text plots of a trial, to see at the bench whether the recording is as intended."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from bifa.data import Trial
 
 WIDEST, HEIGHT = 60, 6  # characters; a character of braille is 2 by 4 dots
-_DENSE = 8  # points a sample
+_DENSE = 8  # points per sample
 _BRAILLE = 0x2800
 _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))  # by column and row within a character
 _MARGIN = 8  # characters for the axis's numbers
 
 
 def text_plot(trial: Trial, plain: bool = False, columns: int = 80) -> list[str]:
-    """Lines of at most `columns` characters: force over displacement, or displacement and pressure over time.
+    """Plot force over displacement, or displacement and pressure over time, in lines of at most `columns` characters.
 
-    plain: only ASCII.
+    plain: use only ASCII.
     """
     seen = trial.columns
     if "force_N" in seen:
@@ -31,8 +31,8 @@ def text_plot(trial: Trial, plain: bool = False, columns: int = 80) -> list[str]
 
 
 def panel(x: np.ndarray, y: np.ndarray, below: str, above: str, plain: bool = False, columns: int = 80) -> list[str]:
-    """Lines of a plot of `y` over `x`, each of shape (n,), with what they are called; of `columns` characters at most,
-    on a terminal that is not absurdly narrow."""
+    """Plot `y` over `x`, each of shape (n,), labelled `above` and `below`, in lines of at most `columns` characters
+    unless the terminal is absurdly narrow."""
     x, y = _joined(x), _joined(y)
     width = max(min(WIDEST, columns - _MARGIN - 2), len(below) + 20)
     rows = _rows(x, y, plain, width)
@@ -44,7 +44,7 @@ def panel(x: np.ndarray, y: np.ndarray, below: str, above: str, plain: bool = Fa
 
 
 def _joined(values: np.ndarray) -> np.ndarray:
-    """The polygon through the samples, so densely that its dots touch, shape (samples * _DENSE,)."""
+    """Interpolate linearly between samples, so densely that the dots touch; shape ((samples - 1) * _DENSE,)."""
     return np.interp(np.arange(0, len(values) - 1, 1 / _DENSE), np.arange(len(values)), values)
 
 
@@ -65,6 +65,6 @@ def _rows(x: np.ndarray, y: np.ndarray, plain: bool, width: int) -> Sequence[str
 
 
 def _places(values: np.ndarray, count: int) -> np.ndarray:
-    """Which of `count` places between the least and the greatest each value has, shape of `values`."""
+    """Index of each value on a scale of `count` steps from the smallest to the largest, shape of `values`."""
     span = float(np.ptp(values)) or 1.0
     return np.minimum(((values - values.min()) / span * count).astype(int), count - 1)

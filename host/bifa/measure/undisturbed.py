@@ -1,4 +1,4 @@
-"""A trial in which the robot was stopped, or did anything but what was asked, is not valid."""
+"""Reject trials in which the robot was stopped or did anything other than what was commanded."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from bifa.link.table import CHAMBERS
 
 _CONNECTED = {0.0: "vacuum", 1.0: "positive"}
 _SUPPLIES = set(_CONNECTED.values())
-_LATE_US = 27_000  # a supply is held for 21 ms at least and a chamber then vented for 5 (lib/valves/sequencer.h)
-_SAMPLES = 3  # in that time
+_LATE_US = 27_000  # a supply is held for at least 21 ms and the chamber then vented for 5 (lib/valves/sequencer.h)
+_SAMPLES = 3  # samples in that time
 
 
 class DisturbedError(BifaError):
-    """The robot did something else in the middle of a trial."""
+    """The robot did something other than commanded during a trial."""
 
 
 def refuse_disturbed(samples: Sequence[Sample], state: str, held: Mapping[str, str] | None = None) -> None:
-    """Raise DisturbedError unless the robot was in `state` in all of `samples`, its valves as it was commanded.
+    """Raise DisturbedError unless the robot was in `state` in all of `samples`, with its valves as commanded.
 
-    held: what each chamber is connected to in all of them; None where commands change. A chamber that is switched is
-    vented for a few milliseconds first, and where it was switched just before, as a gait may at its start, keeps the
-    supply that it had until then; the gait's very first switches may have passed before the first sample.
+    held: what each chamber is connected to throughout; None if commands change. A chamber that is switched is first
+    vented for a few milliseconds; if it was switched just before, as may happen at the start of a gait, it keeps its
+    supply until then. A gait's very first switches may precede the first sample.
     """
     if not samples:
         raise DisturbedError("the Uno sent no sample in that state: was it stopped at once?")
@@ -32,14 +32,14 @@ def refuse_disturbed(samples: Sequence[Sample], state: str, held: Mapping[str, s
         after_us = sample.time_us - samples[0].time_us
         unseen = _SUPPLIES if held is None and after_us <= _LATE_US else set()
         if wrong := _wrong(before, unseen, sample, state, held):
-            raise DisturbedError(f"{1e-6 * after_us:.2f} s after it began {wrong}: the trial is not valid; repeat it")
+            raise DisturbedError(f"{1e-6 * after_us:.2f} s after it began, {wrong}: the trial is not valid; repeat it")
 
 
 def _wrong(
     before: Sequence[Sample], unseen: set[str], sample: Sample, state: str, held: Mapping[str, str] | None
 ) -> str:
-    """What is not as it should be, in words, after the samples just `before` and commands that may have been `unseen`;
-    empty where all is."""
+    """Describe what is wrong with a sample, given the samples just `before` and commands that may have been `unseen`;
+    empty if nothing is."""
     if sample.state != state:
         return f"the robot was {sample.state} instead of {state}"
     for i, chamber in enumerate(CHAMBERS):

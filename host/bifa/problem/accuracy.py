@@ -1,4 +1,4 @@
-"""What accuracy matters to the person, for each quantity that is measured."""
+"""The accuracy that the user needs, for each measured quantity."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ QUANTITIES = ("displacement_mm", "pressure_psi", "force_N")
 
 
 class AccuracyError(BifaError):
-    """An accuracy that was asked for is no CHANNEL=VALUE; the text says what there is."""
+    """An accuracy is not of the form QUANTITY=VALUE; the text lists the quantities."""
 
 
 def accuracies(texts: Iterable[str]) -> dict[str, float]:
-    """RMS errors by quantity from texts like "displacement_mm=0.5". Raises AccuracyError."""
+    """Parse RMS errors by quantity from texts such as "displacement_mm=0.5". Raises AccuracyError."""
     found = {}
     for text in texts:
         name, _, value = text.partition("=")
@@ -33,11 +33,12 @@ def accuracies(texts: Iterable[str]) -> dict[str, float]:
 
 
 def accuracy_of(channel: str, accuracies: Mapping[str, float]) -> float:
-    """The accuracy of a channel: displacement_head_mm is a displacement_mm. 0: only the noise counts."""
+    """The accuracy of a channel (displacement_head_mm is a displacement_mm); 0 if none was given, so that only the
+    noise counts."""
     return next((v for q, v in accuracies.items() if is_of(channel, q)), 0.0)
 
 
 def is_of(channel: str, quantity: str) -> bool:
-    """Whether a channel is one of a quantity."""
+    """Whether a channel measures a quantity."""
     first, unit = quantity.rsplit("_", 1)
     return channel.startswith(first) and channel.endswith(unit)

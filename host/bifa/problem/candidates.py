@@ -14,14 +14,15 @@ from bifa.robot.gait import BASELINE, Gait
 from bifa.simulate import of_gait
 
 _STROKE_MM = {"large": 53.8, "small": 30.0}
-# Not quite the step that is recorded (`bifa.measure.experiments`): the second switch is on the grid, the end sooner.
+# Slightly different from the step that is recorded (`bifa.measure.experiments`): the second switch is on the sampling
+# grid, and the record ends sooner.
 _UP_S, _DOWN_S, _END_S = 0.5, 5.0, 11.0
 _WALK_CYCLES = 4
 SLOW = Gait(9.0, 270.0, 90.0, 0.5, 0.5, 0.5)
 
 
 def of(dataset: Dataset) -> Iterator[tuple[Mapping[str, Any], Trial]]:
-    """Settings (the arguments of `bifa experiment`) and the empty trial of each experiment that can be run."""
+    """Settings (the arguments of `bifa experiment`) and an empty trial for each experiment that can be run."""
     for actuator in ("large", "small"):
         for rate in (0.5, 2.0, 10.0):
             for pressure in (0.0, 8.0):

@@ -1,9 +1,9 @@
-"""The stiffness curve while it is being fitted: the static fit plus whitened changes of its shape.
+"""The stiffness curve during a fit: the static fit plus whitened changes of its shape.
 
-In the monomials of a model file, or in Chebyshev's, the coefficients of K are hopelessly correlated.
-`StiffnessFit.shapes` gives directions in which the static data leave the curve uncertain by one standard deviation
-each: the coordinates `body_shape_01` ... (the least certain one first, mostly the continuation beyond the static
-range). Where the actuator never moves by itself, the continuation is left out.
+The coefficients of K are extremely correlated, both those of a model file's monomials and those of Chebyshev
+polynomials. `StiffnessFit.shapes` returns directions in which the curve is uncertain by one standard deviation each.
+They are the coordinates `body_shape_01` ... (the least certain first, mostly the continuation beyond the static range).
+If the actuator never moves freely, the continuation is left out.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from bifa.robot.stiffness import DEGREE, StiffnessCurve
 from bifa.simulate.tables import Family
 from lacuna.system import Parameter
 
-_WIDEST = 500.0  # standard deviations that a shape may move: an effect unaccounted for biases the static fit by many
-_PRIOR_SD = 5.0  # a shape further off belies the static data: an effect is at work, which no curve should absorb
-_SCALE = 150.0  # derivatives step by 0.3 to 3 standard deviations: well above the integrator's own error
-_FELT_N = 0.01  # a shape that changes K by less does not change a walk that one could measure
+_WIDEST = 500.0  # bound on a shape, in standard deviations: an unmodelled effect biases the static fit by many
+_PRIOR_SD = 5.0  # larger changes contradict the static data and indicate an effect, which no curve should absorb
+_SCALE = 150.0  # makes derivatives step by 0.3 to 3 standard deviations: well above the integrator's error
+_FELT_N = 0.01  # a shape that changes K by less has no measurable influence on a walk
 
 
 @dataclass(frozen=True)
 class FittedCurve:
-    """`prefix` names the actuator's parameters: "body" or "small". `moves`: there are trials in which the actuator
-    moves by itself, and so reaches beyond the static range."""
+    """The parametrised stiffness curve of an actuator. `prefix` of its parameters' names: "body" or "small". `moves`:
+    whether the actuator moves freely in some trials and so reaches beyond the static range."""
 
     prefix: str
     fit: StiffnessFit
@@ -55,24 +55,24 @@ class FittedCurve:
 
     @cached_property
     def felt(self) -> frozenset[str]:
-        """The shapes that matter in a walk."""
+        """Names of the shapes that influence a walk."""
         most_N = np.abs(chebyshev.chebval(np.linspace(-1.0, 1.0, 200), self.shapes.T)).max(axis=1)
         return frozenset(name for name, size in zip(self.names, most_N, strict=True) if size > _FELT_N)
 
     def curve(self, weights: tuple[float, ...]) -> StiffnessCurve:
-        """The curve with each shape added as often as `weights` say."""
+        """The curve plus the sum of the shapes weighted by `weights`."""
         coefficients = self.fit.coefficients + np.asarray(weights) @ self.shapes
         return StiffnessCurve(tuple(chebyshev.cheb2poly(coefficients)), self.fit.lower_m, self.fit.upper_m)
 
     @cached_property
     def tables(self) -> Family:
-        """The curves that the shapes make, as the simulator reads them."""
+        """The family of curves spanned by the shapes, as tables for the simulator."""
         none, ends = (0.0,) * len(self.shapes), (self.fit.lower_m, self.fit.upper_m)
         return Family(self.curve(none), [StiffnessCurve(tuple(way), *ends) for way in self._ways])
 
     @cached_property
     def changes(self) -> dict[str, dict[str, float]]:
-        """By how much each shape changes the coefficients of the model's curve, by their names in a model."""
+        """The change in the coefficients of the model's curve per unit of each shape, by their names in a model."""
         return {
             name: {f"{self.prefix}_stiffness.{power}": float(change) for power, change in enumerate(way)}
             for name, way in zip(self.names, self._ways, strict=True)
@@ -80,5 +80,5 @@ class FittedCurve:
 
     @cached_property
     def _ways(self) -> list[np.ndarray]:
-        """The shapes in powers of the normalised coordinate."""
+        """The shapes' coefficients in powers of the normalised coordinate."""
         return [np.append(chebyshev.cheb2poly(shape), [0.0, 0.0])[: DEGREE + 1] for shape in self.shapes]

@@ -1,4 +1,4 @@
-"""What was done to the robot in a trial, without what came of it: all that a free-running prediction may use."""
+"""Inputs of a trial: what was done to the robot, without its response. A free-running prediction uses nothing else."""
 
 from __future__ import annotations
 
@@ -34,8 +34,9 @@ Given = TypeVar("Given", bound="Inputs", covariant=True)
 
 @dataclass(frozen=True)
 class RobotInTrial(Generic[Given]):
-    """One robot in a trial. `inputs`: what reached it (learnt curves may change the trial's own); `zeros_m`: K's
-    contracted zero of body and small actuator; `nuisances` may hold what varies from run to run."""
+    """One robot in a trial. `inputs`: those that reach the robot (learnt curves may alter the trial's); `zeros_m`:
+    contracted equilibrium of K for the body and a small actuator; `nuisances`: values that may include the trial's
+    nuisances."""
 
     inputs: Given
     plant: Plant
@@ -44,19 +45,19 @@ class RobotInTrial(Generic[Given]):
 
     @property
     def commands(self: RobotInTrial[StepInputs] | RobotInTrial[WalkInputs]) -> Timeline:
-        """When the valves switched."""
+        """The valves' switches, shifted by the trial's nuisance."""
         return shifted(self.inputs.commands, self.nuisances.get("switch_late_s", 0.0))
 
     @property
     def zero_m(self) -> float:
-        """Of the actuator on its stand."""
+        """Contracted equilibrium of the actuator on its stand, in m."""
         return self.zeros_m[self.inputs.actuator == "small"]
 
 
 class Inputs(Protocol):
-    """`channels`: what is predicted. `actuator`: "large", "small", or None where it is not a single one's test.
-    `positive_psi`: the supply, where the trial sets one of its own for the walk. `bench`: trials with an equal one are
-    simulated side by side."""
+    """Inputs of a trial. `channels`: names of the predicted channels. `actuator`: "large" or "small"; None if the trial
+    does not test a single actuator. `positive_psi`: the positive supply of a walk if the trial sets its own. `bench`:
+    trials with equal values are simulated side by side."""
 
     @property
     def channels(self) -> tuple[str, ...]: ...
@@ -72,14 +73,15 @@ class Inputs(Protocol):
 
     @staticmethod
     def simulate(cases: Sequence[RobotInTrial[Any]], tolerance_m: float, together: bool) -> list[Columns]:
-        """The channels of each case on one bench, each of shape (n,). `together`: see `bifa.simulate.walks`."""
+        """Simulate cases of one bench. Returns the channels of each, of shape (n,). `together`: see
+        `bifa.simulate.walks`."""
         ...
 
 
 @dataclass(frozen=True)
 class StaticInputs:
-    """`turned_m`: how far the motion went where it turned between samples, each just before the sample number
-    `turned_before`. What remembers travel misses it there."""
+    """Inputs of a static loading. `turned_m`: displacements at which the motion reversed between samples, each just
+    before the sample with the index in `turned_before`. Effects that depend on travel need these turning points."""
 
     actuator: str
     time_s: np.ndarray
@@ -97,7 +99,7 @@ class StaticInputs:
 
     @cached_property
     def path_s(self) -> np.ndarray:
-        """Times of samples and turns; these in the middle between samples, so that trials share them."""
+        """Times of samples and turns. Turns are placed midway between samples, so that trials share their times."""
         at = np.array(self.turned_before, int)
         return np.insert(self.time_s, at, 0.5 * (self.time_s[at - 1] + self.time_s[at]))
 
@@ -119,7 +121,7 @@ class StaticInputs:
             [(case.inputs.path_m - case.zero_m) * _MM for case in cases],
             [case.inputs.pressure_psi for case in cases],
         )
-        # the turns are no samples
+        # drop the turns, which are not samples
         return [{name: record[name][first._is_sample] for name in first.channels} for record in records]
 
 
@@ -156,8 +158,8 @@ class StepInputs:
 
 @dataclass(frozen=True)
 class PullInputs:
-    """`extended_psi`: by how much the head was extended before, if that is more; `grip`: factor of the friction's
-    coefficients, (n,) or one for all samples."""
+    """Inputs of an anchor pull. `extended_psi`: pressure at which the head was extended first, if that is more than
+    `pressure_psi`; `grip`: factor of the friction coefficients, (n,) or one for all samples."""
 
     pulled_s: np.ndarray
     rate_mm_s: float
@@ -196,13 +198,13 @@ class PullInputs:
         ]
 
     def _force(self, record: SimulatedTrial, nuisances: Theta) -> np.ndarray:
-        """The resistance, passing from the wound-up load cell to sliding over one sample instead of at once.
+        """The resistance, with the transition from the load cell's pull to sliding spread over one sample.
 
-        A peak that lies between two samples is only known to lie there. Were the prediction to jump, no small change
-        of a parameter would move it, and no derivative could find mu_s.
+        A peak between two samples is known only to lie there. If the prediction jumped, a small change of a parameter
+        would not move the peak, and derivatives could not find mu_s.
         """
         late_s = nuisances.get("slip_late_s", 0.0)
-        # until the head slips the load cell winds up alone: what it pulls is in proportion to its stiffness
+        # until the head slips, the load cell's pull is proportional to its stiffness
         wound = record["wound_N"] * (nuisances.get(LOAD_CELL, self.load_cell_N_m) / self.load_cell_N_m)
         holding, kinetic = self.grip * record["holding_N"], self.grip * record["kinetic_N"]
         gives = np.flatnonzero(wound >= holding)
@@ -245,12 +247,12 @@ class WalkInputs:
 
 
 def inputs_of(trial: Trial) -> Inputs:
-    """The inputs of a recorded trial."""
+    """Derive the inputs of a recorded trial."""
     return _MAKERS[trial.experiment](trial)
 
 
 def _pressure_psi(trial: Trial) -> float:
-    """What the regulator was asked for, where the recorder noted it: its converter has steps of 0.03 psi."""
+    """The regulator's set-point if recorded (its converter has steps of 0.03 psi), else the commanded pressure."""
     noted = trial.extra.get("set_point_psi")
     return trial.commanded_psi if noted is None else noted
 
@@ -291,7 +293,7 @@ def _pull(trial: Trial) -> PullInputs:
 
 
 def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) -> np.ndarray:
-    """How long the puller has been moving, so that rate times it is the pulled distance; shape (n,), rising."""
+    """How long the puller has been moving: the pulled distance over the rate; shape (n,), nondecreasing."""
     path_m = imposed_motion(time_s, pulled_mm / _MM).displacement_m
     return np.maximum.accumulate(np.clip(path_m * _MM / rate_mm_s, 0.0, None))
 
@@ -299,7 +301,7 @@ def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) ->
 def _walk(trial: Trial) -> WalkInputs:
     pressures = ("pressure_body_psi", "pressure_head_psi", "pressure_tail_psi")
     displacements = [n for n in ("displacement_head_mm", "displacement_tail_mm") if n in trial.columns]
-    # at the rig's usual pressure the supply is what a gauge says, or the fit: the regulator may be off its set-point
+    # at the rig's usual pressure, the supply is measured by a gauge or fitted: the regulator may miss its set-point
     at_its_own = None if trial.pressure_psi is None else trial.extra.get("set_point_psi", trial.pressure_psi)
     return WalkInputs(
         time_s=_time_s(trial),

@@ -1,4 +1,4 @@
-"""The robot's library of effects in the words of the engine."""
+"""The robot's library of effects, converted to the engine's types."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from lacuna.system import Effect, Parameter
 
 
 def engine_effects() -> dict[str, Effect]:
-    """Every effect of `bifa.effects`, its size first among its parameters."""
+    """All effects of `bifa.effects`, with their sizes first among the parameters."""
     return {name: _engine_effect(effect) for name, effect in effects.library().items()}
 
 
@@ -30,7 +30,7 @@ def _engine_effect(effect: effects.PhysicalEffect) -> Effect:
 
 def _engine_parameter(p: effects.EffectParameter) -> Parameter:
     lower, upper = p.lower, p.upper
-    # a trial's own value may lie anywhere
+    # a trial's own value may be anywhere within its bounds
     scale = 0.25 * (upper - lower) if p.own else 0.3 * abs(p.typical) or 0.05 * (upper - lower)
     if p.period is not None:
         lower, upper = p.typical - 0.5 * p.period, p.typical + 0.5 * p.period

@@ -1,4 +1,4 @@
-"""What the cross-head did: its displacement without the encoder's noise, and its direction."""
+"""The motion of the cross-head: its displacement without the encoder's noise, and its direction."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 _DIRECTION_WINDOW = 25  # samples: half a second at 50 Hz
 _SMOOTHING_WINDOW = 11
-_MARGIN = 17  # samples at either end of a stretch that may belong to the next one: fewer hide in the window's slope
-_OFF = 5.0  # standard deviations from a line: not on it
-_STRAIGHT = 1.2  # times the noise that neighbouring samples show: what straight lines may leave
+_MARGIN = 17  # samples at either end of a stretch that may belong to its neighbour, given the direction's window
+_OFF = 5.0  # standard deviations from a line beyond which a sample is not on it
+_STRAIGHT = 1.2  # greatest residual of straight lines, over the noise estimated from differences of adjacent samples
 
 _Line = tuple[float, float]  # level at time 0, slope
 
 
 class ImposedMotion(NamedTuple):
-    """`displacement_m` and `direction` (1, 0 at rest, -1), shape (n,). `turned_s`, `turned_m`: when and where it went
-    straight from one direction into the other between two samples, as far as that is known."""
+    """The motion: `displacement_m` and `direction` (1, 0 at rest, -1), shape (n,). `turned_s`, `turned_m`: times and
+    displacements at which it reversed between two samples without a rest, as far as they are known."""
 
     displacement_m: np.ndarray
     direction: np.ndarray
@@ -28,11 +28,11 @@ class ImposedMotion(NamedTuple):
 
 
 def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> ImposedMotion:
-    """The imposed motion, from its measured displacement.
+    """Reconstruct the imposed motion from its measured displacement.
 
-    A cross-head that is driven at constant rates goes by straight lines, which meet where it starts, turns and stops:
-    these say where it was more exactly than any smoothing. Where they do not fit, each stretch in one direction is
-    smoothed by itself. A noise-free ramp comes back unchanged.
+    The path of a cross-head driven at constant rates consists of straight lines that meet where it starts, reverses and
+    stops; fitting them is more accurate than any smoothing. If they do not fit, each stretch in one direction is
+    smoothed separately. A noise-free ramp is returned unchanged.
     """
     displacement_m = np.asarray(displacement_m, float)
     n = len(displacement_m)
@@ -50,8 +50,8 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> ImposedMot
 
 
 def moving_line(values: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Level and slope (a sample) of the straight line through the `window` values around each of (n,), which is odd;
-    where there are too few on one side, of the line through the outermost. The filter of Savitzky and Golay, degree 1:
+    """Level and slope (per sample) of the straight line fitted to the `window` values (an odd number) around each of
+    `values` (n,); near the ends, of the line through the outermost window. This is a Savitzky-Golay filter of degree 1;
     SciPy's takes half a second to import."""
     half = window // 2
     around, offset = sliding_window_view(values, window), np.arange(window) - half
@@ -64,8 +64,8 @@ def moving_line(values: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray
 
 
 def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> ImposedMotion | None:
-    """The motion as straight lines; None where it was not one, as what they leave shows: it may not exceed what
-    neighbouring samples differ by."""
+    """The motion as straight lines; None if it does not consist of such lines, that is, if their residuals exceed the
+    noise estimated from differences of adjacent samples."""
     stretches = _stretches(direction)
     if any(stop - start < 2 * _MARGIN + 3 for start, stop in stretches if direction[start]):
         return None
@@ -88,7 +88,7 @@ def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndar
 
 
 def _rest_before(time_s: np.ndarray, displacement_m: np.ndarray, line: _Line) -> list[_Line]:
-    """The line of a rest too short to have been found, before a motion along `line`; none where there is none."""
+    """The line of a rest before a motion along `line` that was too short to be detected; empty if there was no rest."""
     level, slope = line
     off = np.abs(displacement_m - level - slope * time_s)
     inside = off[_MARGIN : 3 * _MARGIN]
@@ -98,7 +98,7 @@ def _rest_before(time_s: np.ndarray, displacement_m: np.ndarray, line: _Line) ->
 
 
 def _line(time_s: np.ndarray, displacement_m: np.ndarray, start: int, stop: int, moves: bool) -> _Line:
-    """Level at time 0 and slope of a stretch, away from its ends where it moves; slope 0 where it rests."""
+    """Level at time 0 and slope of a stretch. A moving stretch is fitted away from its ends; at rest the slope is 0."""
     if not moves:
         return float(np.median(displacement_m[start:stop])), 0.0
     inside = slice(start + _MARGIN, stop - _MARGIN)
@@ -107,8 +107,8 @@ def _line(time_s: np.ndarray, displacement_m: np.ndarray, start: int, stop: int,
 
 
 def _sharpened(displacement_m: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Put an immediate reversal at the very sample where the displacement turns: the window that finds the direction
-    shows a short rest there."""
+    """Place an immediate reversal exactly at the sample where the displacement turns, where the window that detects the
+    direction shows a short rest."""
     for start, stop in _stretches(direction)[1:-1]:
         before, after = direction[start - 1], direction[stop]
         if direction[start] == 0 and before == -after and stop - start <= _DIRECTION_WINDOW:
@@ -119,6 +119,6 @@ def _sharpened(displacement_m: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 def _stretches(direction: np.ndarray) -> list[tuple[int, int]]:
-    """First sample of each stretch in one direction, and the one behind its last."""
+    """Start and end (exclusive) of each stretch in one direction."""
     edges = np.flatnonzero(np.diff(direction)) + 1
     return list(zip(np.r_[0, edges], np.r_[edges, len(direction)], strict=True))

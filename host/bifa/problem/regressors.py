@@ -1,4 +1,4 @@
-"""On what a residual may depend: named quantities at every sample of a trial."""
+"""Regressors: named quantities at every sample of a trial on which a residual may depend."""
 
 from __future__ import annotations
 

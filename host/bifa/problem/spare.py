@@ -1,4 +1,4 @@
-"""Conditions that are never fitted, so that an explanation is judged by what it predicts: settings between others."""
+"""Held-out conditions, with settings that lie between others: explanations are judged by their predictions there."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable
 from bifa.data import Dataset, Trial
 from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 
-# By experiment: what is varied, and of how many settings at least one may be spared.
+# By experiment: the quantity that is varied, and the least number of settings from which one may be held out.
 _VARIED: dict[str, tuple[Callable[[Trial], float], int]] = {
     STATIC: (lambda trial: trial.commanded_psi, 3),
     STEP: (lambda trial: trial.commanded_psi, 2),
@@ -18,8 +18,8 @@ _VARIED: dict[str, tuple[Callable[[Trial], float], int]] = {
 
 
 def spare(dataset: Dataset) -> tuple[tuple[str, Hashable], ...]:
-    """(experiment, condition) of one setting of each experiment and actuator: the middle pressure or period (of two
-    pressures of a step the lower), at every rate."""
+    """Select the held-out conditions, as (experiment, condition): for each experiment and actuator, those with the
+    middle pressure or period (the lower of two), at every rate."""
     groups: dict[tuple[str, str | None], list[Trial]] = defaultdict(list)
     for trial in dataset.trials:
         groups[trial.experiment, trial.actuator].append(trial)

@@ -1,14 +1,14 @@
 """The stiffness curve K of eq. (1) from a static test: a 15th-degree polynomial (paper, IV.A.1).
 
-The paper fits NumPy's polynomial to the data at 0 psi. Two things need more care than it tells:
+The paper fits NumPy's polynomial to the data at 0 psi. Two points need more care than it describes:
 
-* in metres the Vandermonde matrix of degree 15 has a condition of 3e24, so the curve is held in Chebyshev
-  polynomials of the normalised coordinate z = 2 (x - lower) / (upper - lower) - 1;
-* the model uses K outside the range that the testing machine covered (under vacuum the actuator folds by some 5 mm
-  more than contracted). There the fit alone runs off, so the continuation gets a broad prior on its curvature and may
-  not turn downwards; equilibria seen in step responses then pin it down (`StiffnessFit.with_equilibria`).
+* In metres, the Vandermonde matrix of degree 15 has a condition number of 3e24, so the curve is represented in
+  Chebyshev polynomials of the normalised coordinate z = 2 (x - lower) / (upper - lower) - 1.
+* The model uses K outside the range that the testing machine covered (under vacuum the actuator folds some 5 mm beyond
+  its contracted length). There the fit alone diverges, so the continuation gets a broad prior on its curvature and must
+  not decrease; equilibria observed in step responses then constrain it (`StiffnessFit.with_equilibria`).
 
-The fit is a Gaussian posterior, so it carries the uncertainty of every point of the curve with it.
+The fit is a Gaussian posterior and thus includes the uncertainty of every point of the curve.
 """
 
 from __future__ import annotations
@@ -24,26 +24,27 @@ from bifa.errors import BifaError
 from bifa.robot.stiffness import DEGREE
 from lacuna.estimation.sampling import correlation_samples
 
-CONTINUATION = 0.13  # of the static range, on either side, at most: beyond it the curve goes on straight
+CONTINUATION = 0.13  # greatest width on either side, over the static range; beyond it the curve is straight
 _PRIOR_POINTS = 6  # on either side
-_TOLD = 0.9  # share of the information that stems from static loading
+_TOLD = 0.9  # least share of the information from static loading for a shape to count as determined by it
 _MIN_POINTS = 4 * (DEGREE + 1)
 
 
 class UndeterminedError(BifaError):
-    """A parameter cannot be determined from this data set; the text says which, and which experiment would do it."""
+    """A parameter cannot be determined from this data set; the text says which, and which experiment would determine
+    it."""
 
 
 @dataclass(frozen=True)
 class StiffnessFit:
     """A posterior over stiffness curves.
 
-    lower_m, upper_m: where the polynomial holds; beyond them the model continues in a straight line.
-    covered_m: the displacements that the testing machine covered.
+    lower_m, upper_m: range of the polynomial; beyond it the model continues in a straight line.
+    covered_m: range of displacements that the testing machine covered.
     coefficients: Chebyshev coefficients in z [N], shape (16,).
-    information: the inverse of their covariance [1/N^2], shape (16, 16); `static` is the part of it that stems from
-        static loading, the rest from the broad prior on the continuation and from equilibria.
-    residual_N: RMS of the data about the curve, hysteresis included.
+    information: the inverse of their covariance [1/N^2], shape (16, 16); `static` is the part from static loading, the
+        rest is from the broad prior on the continuation and from equilibria.
+    residual_N: RMS of the data about the curve, including hysteresis.
     """
 
     lower_m: float
@@ -69,17 +70,20 @@ class StiffnessFit:
         return float(np.sqrt(max(row @ self.covariance @ row, 0.0)))
 
     def unstable_m(self) -> float:
-        """The unstable equilibrium, eq. (3)'s threshold: where K falls through 0 between the stable states."""
+        """The unstable equilibrium (the threshold of eq. (3)), where K falls through 0 between the stable states.
+
+        Raises UndeterminedError if there is none.
+        """
         x = np.linspace(*self.covered_m, 2001)
         force = self.force(x)
         falling = np.flatnonzero((force[:-1] > 0) & (force[1:] <= 0))
         if not len(falling):
-            raise UndeterminedError("the curve does not fall through 0 between its ends: the actuator is not bistable")
+            raise UndeterminedError("the force does not fall through 0 between its ends: the actuator is not bistable")
         i = falling[0]
         return float(x[i] + (x[i + 1] - x[i]) * force[i] / (force[i] - force[i + 1]))
 
     def with_equilibria(self, x: ArrayLike, force_N: ArrayLike, sd_N: ArrayLike) -> StiffnessFit:
-        """The posterior after seeing that the actuator rests at x [m] under a pressure force [N] known to sd [N]."""
+        """The posterior given that the actuator rests at x [m] under a pressure force known to sd [N]."""
         rows = self._rows(np.asarray(x)) / np.asarray(sd_N)[:, None]
         information = self.information + rows.T @ rows
         target = self.information @ self.coefficients + rows.T @ (np.asarray(force_N) / np.asarray(sd_N))
@@ -88,12 +92,12 @@ class StiffnessFit:
         return replace(self, coefficients=coefficients, information=information)
 
     def shapes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ways in which the curve may still change, each by one standard deviation.
+        """Independent changes of the curve, each by one standard deviation of the posterior.
 
-        Returns (16, 16), row j the Chebyshev coefficients [N] of a way, and (16,), True where static loading tells how
-        far. Any curve is `coefficients + z @ shapes`, and what is known so far says that z has zero mean and unit
-        covariance: the coordinates for a joint refinement. Those of the continuation come first, and within each kind
-        the least certain one.
+        Returns the shapes (16, 16), row j holding the Chebyshev coefficients [N] of one change, and (16,), True for
+        those determined by static loading. Any curve is `coefficients + z @ shapes`, where z has zero mean and unit
+        covariance in the posterior: these are the coordinates of the joint fit. Shapes of the continuation come first,
+        and the least certain first within each kind.
         """
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -103,7 +107,7 @@ class StiffnessFit:
             _, sizes, directions = np.linalg.svd((root @ subspace).T, full_matrices=False)
             ways.append(sizes[:, None] * directions)
         shapes = np.concatenate(ways)
-        # A sign for each, so that the coordinates do not depend on the linear algebra library.
+        # Fix the signs, so that the coordinates do not depend on the linear algebra library.
         signs = np.sign(shapes[np.arange(len(shapes)), np.argmax(np.abs(shapes), axis=1)])
         return shapes * signs[:, None], np.arange(len(shapes)) >= np.sum(told < _TOLD)
 
@@ -118,21 +122,21 @@ def fit_stiffness(
     *,
     reach_m: tuple[float, float] | None = None,
 ) -> StiffnessFit:
-    """Fit K to static data at 0 psi, loading and unloading weighted alike wherever they lie, so that the curve runs
-    through the middle of the hysteresis.
+    """Fit K to static data at 0 psi. Loading and unloading have equal weights at every displacement that both cover, so
+    that the curve runs through the middle of the hysteresis loop.
 
     displacement_m, force_N: shape (n,); loading: shape (n,), True while extending.
-    reach_m: the least and greatest displacement that the curve will be asked for, if known.
+    reach_m: the least and greatest displacement at which the curve will be evaluated, if known.
 
-    Raises UndeterminedError if there are too few points, they cover next to nothing, or the force never changes.
+    Raises UndeterminedError if there are too few points, their range is too small, or the force never changes.
     """
     x, force = np.asarray(displacement_m, float), np.asarray(force_N, float)
     if len(x) < _MIN_POINTS:
-        raise UndeterminedError(f"{len(x)} points are too few for a curve of degree {DEGREE}: at least {_MIN_POINTS}")
+        raise UndeterminedError(f"a curve of degree {DEGREE} needs at least {_MIN_POINTS} points, not {len(x)}")
     covered = (float(x.min()), float(x.max()))
     width = covered[1] - covered[0]
     if width < 1e-3:
-        raise UndeterminedError(f"the static test moved by {width * 1e3:.2f} mm only: no curve can be fitted to it")
+        raise UndeterminedError(f"the static test moved by only {width * 1e3:.2f} mm: no curve can be fitted to it")
     if np.ptp(force) == 0.0:
         raise UndeterminedError(f"the force is {force[0]:g} N throughout: is the load cell connected?")
     lower, upper = covered[0] - CONTINUATION * width, covered[1] + CONTINUATION * width
@@ -146,7 +150,7 @@ def fit_stiffness(
     variance = max(_noise_variance(rows, force, loading), 1e-12)
 
     outside = _outside(lower, upper, covered)
-    # Over the continuation's width the force may bend by several times the greatest force seen inside.
+    # Over the width of the continuation, curvature may change the force by several times the greatest measured force.
     bend = 10.0 * np.abs(force).max() / max(covered[0] - lower, upper - covered[1]) ** 2
     prior = _rows(outside, lower, upper, derivative=2) / bend
     information = scaled.T @ scaled / variance + prior.T @ prior
@@ -165,8 +169,8 @@ def fit_stiffness(
 
 
 def _rows(x: np.ndarray, lower: float, upper: float, derivative: int = 0) -> np.ndarray:
-    """The Chebyshev polynomials (or their derivatives with respect to x) at x, shape (n, 16); straight beyond the
-    ends, as the model continues them."""
+    """The Chebyshev polynomials (or their derivatives with respect to x) at x, shape (n, 16), with the model's straight
+    continuation beyond the ends."""
     to_z = 2.0 / (upper - lower)
     x = np.atleast_1d(np.asarray(x, float))
     inside = np.clip(x, lower, upper)
@@ -187,7 +191,7 @@ def _outside(lower: float, upper: float, covered: tuple[float, float]) -> np.nda
 
 
 def _even_weights(x: np.ndarray, loading: np.ndarray, bins: int = 100) -> np.ndarray:
-    """Weights of mean 1 with which each branch counts alike at every displacement that both cover."""
+    """Weights, of mean 1, that give both branches equal total weight at every displacement that both cover."""
     place = np.minimum(((x - x.min()) / np.ptp(x) * bins).astype(int), bins - 1)
     up = np.bincount(place[loading], minlength=bins)
     down = np.bincount(place[~loading], minlength=bins)
@@ -199,7 +203,7 @@ def _even_weights(x: np.ndarray, loading: np.ndarray, bins: int = 100) -> np.nda
 
 
 def _noise_variance(rows: np.ndarray, force: np.ndarray, loading: np.ndarray) -> float:
-    """Variance of one sample, inflated by serial correlation. Each branch is compared with a curve of its own: the
+    """Variance of one sample, inflated by serial correlation. Each branch is compared with its own curve, since the
     distance between the branches is hysteresis, not noise."""
     variance = 0.0
     for branch in (loading, ~loading):
@@ -213,11 +217,11 @@ def _noise_variance(rows: np.ndarray, force: np.ndarray, loading: np.ndarray) ->
 
 
 def _solve_monotone(information: np.ndarray, target: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Minimise c'Ac/2 - b'c subject to slopes @ c >= 0: the continuation may not turn back."""
+    """Minimise c'Ac/2 - b'c subject to slopes @ c >= 0, so that the continuation does not decrease."""
     free = np.linalg.solve(information, target)
     if (slopes @ free >= 0.0).all():
         return free
-    root = np.linalg.cholesky(information)  # whitened, the problem is round
+    root = np.linalg.cholesky(information)  # in whitened coordinates, the problem is well conditioned
     inverse = np.linalg.inv(root.T)
     center = root.T @ free
     turned = slopes @ inverse

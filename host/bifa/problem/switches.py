@@ -1,9 +1,10 @@
-"""When did the valves switch? A column of commands at 100 Hz says it to 10 ms only; a snap-through is faster.
+"""The times at which the valves switched. A column of commands at 100 Hz resolves only 10 ms; a snap-through is faster.
 
-What is known better is used, in this order: the schedule, where the recorder declared it (`extra.switch_time_s`); the
-gait's settled times, where every recorded switch agrees with them to a sample; else what `bifa.simulate.refine` makes
-of a walk's column. Of a step, the column alone says that a switch lies between two samples: the middle is taken, half
-a sample is its uncertainty, and round times are no evidence that it was at the sample that first shows it.
+Better information is used in this order: the schedule, if the recorder declared it (`extra.switch_time_s`); the gait's
+settled times, if every recorded switch agrees with them to a sample; else the times that `bifa.simulate.refine` finds
+from a walk's columns. In a step response, the column shows only that a switch lies between two samples. The middle is
+used, with an uncertainty of half a sample; round times are no evidence that the switch was at the sample that first
+shows it.
 """
 
 from __future__ import annotations
@@ -18,18 +19,18 @@ from bifa.robot.gait import Gait
 from bifa.simulate import Timeline, of_gait, of_samples, recorded_commands, refine, timeline, vented_between
 from bifa.simulate.timeline import COMMANDS
 
-_SPARE_S = 1e-6  # for times that fall on a sample
+_SPARE_S = 1e-6  # tolerance for times that coincide with a sample
 
 
 def elapsed_s(trial: Trial) -> np.ndarray:
-    """Time since the trial began: its own time axis if that begins at 0, give or take a sample, else the time since the
+    """Time since the trial began: its own time axis if that begins within 1.5 samples after 0, else the time since the
     first sample."""
     begin_s, sample_s = trial.time_s[0], np.median(np.diff(trial.time_s))
     return trial.time_s if 0.0 <= begin_s < 1.5 * sample_s else trial.time_s - begin_s
 
 
 def shifted(commands: Timeline, late_s: float) -> Timeline:
-    """All switches later by `late_s`; the state at time 0 stays."""
+    """Delay all switches by `late_s`, except the initial state at time 0."""
     if late_s == 0.0:
         return commands
     time_s = np.where(commands.time_s > 0.0, commands.time_s + late_s, commands.time_s)
@@ -37,25 +38,25 @@ def shifted(commands: Timeline, late_s: float) -> Timeline:
 
 
 def delayed(commands: Timeline, to_vacuum_s: float, to_positive_s: float) -> Timeline:
-    """The switches of valves that take so long. Not re-sorted: a simulation does that."""
+    """Delay the switches to vacuum and to positive pressure. The result is not sorted; the simulation does that."""
     delay_s = np.where(commands.command == COMMANDS["positive"], to_positive_s, to_vacuum_s)
     return Timeline(commands.time_s + delay_s, commands.chamber, commands.command)
 
 
 def seconds_per_uno_s(trial: Trial) -> float:
-    """How long a second of the Uno lasts by the instrument's quartz: the Uno's resonator is good to 0.5 % only."""
+    """Seconds on the instrument's quartz clock per second of the Uno, whose resonator is accurate only to 0.5 %."""
     return 1.0 / trial.extra.get("clock_rate", 1.0)
 
 
 def valves_of(commands: Timeline, trial: Trial) -> Timeline:
-    """What the valves do at these commands, which are on the trial's own clock, in seconds."""
+    """The valves' switches for commands given on the trial's own clock, in seconds and with the Uno's dead time."""
     unit = seconds_per_uno_s(trial)
     elapsed = Timeline(commands.time_s * unit, commands.chamber, commands.command)
     return vented_between(elapsed, trial.extra.get("dead_time_s", 0.0) * unit)
 
 
 def switch_sd_s(trial: Trial) -> float:
-    """How well the switching times of a trial are known as a whole, as a standard deviation; 0: exactly."""
+    """Standard deviation of the shift common to a trial's switching times; 0 if they are known exactly."""
     noted = trial.extra.get("switch_error_s")
     if noted is not None:
         return float(noted) / np.sqrt(3.0)
@@ -66,7 +67,7 @@ def switch_sd_s(trial: Trial) -> float:
 
 
 def step_timeline(trial: Trial) -> Timeline:
-    """The switches of a step response, as chamber 0; times as `elapsed_s` gives them."""
+    """The switches of a step response, as chamber 0, on the time axis of `elapsed_s`."""
     time_s = elapsed_s(trial)
     state = (trial.columns["command"] > 0.5).astype(int)
     at = np.flatnonzero(np.diff(state)) + 1
@@ -79,7 +80,7 @@ def step_timeline(trial: Trial) -> Timeline:
 
 
 def walk_timeline(trial: Trial) -> Timeline:
-    """The switches of a walk; times as `elapsed_s` gives them."""
+    """The switches of a walk, on the time axis of `elapsed_s`."""
     time_s = elapsed_s(trial)
     commands = recorded_commands(trial.columns)
     recorded = of_samples(time_s - trial.extra.get("command_age_s", 0.0), commands)
@@ -95,7 +96,8 @@ def walk_timeline(trial: Trial) -> Timeline:
 
 
 def _with_times(recorded: Timeline, noted: dict[str, Sequence[float]]) -> Timeline:
-    """The recorded switches, the n-th one of each chamber at its noted time; the first entry is the state at 0."""
+    """The recorded switches with the n-th switch of each chamber at its declared time; the first entry of each chamber
+    is its state at time 0."""
     time_s = recorded.time_s.copy()
     for chamber, name in enumerate(CHAMBERS):
         mine = np.flatnonzero(recorded.chamber == chamber)[1:]
@@ -106,9 +108,9 @@ def _with_times(recorded: Timeline, noted: dict[str, Sequence[float]]) -> Timeli
 
 
 def _settled(gait: Gait, recorded: Timeline, time_s: np.ndarray, ahead_s: float, error_s: float) -> Timeline | None:
-    """The gait's own switches, where the gait was `ahead_s` on at time 0, shifted as a whole by no more than a start
-    between two samples requires, as each may be off by `error_s`; None where the recorded ones are not the same
-    switches to a sample."""
+    """The switches of a settled gait that has run for `ahead_s` at time 0, shifted as a whole by the least amount that
+    agrees with the record if each switch may be off by `error_s`. None if they do not agree with the recorded switches
+    to a sample."""
     sample_s = float(np.median(np.diff(time_s)))
     ideal = of_gait(gait, float(time_s[-1]) + sample_s, 2.0 * np.pi * ahead_s / gait.period_s)
     low, high = -np.inf, np.inf
@@ -117,8 +119,8 @@ def _settled(gait: Gait, recorded: Timeline, time_s: np.ndarray, ahead_s: float,
         due = ideal.time_s[ideal.chamber == chamber][1:]
         states, begins = recorded.command[recorded.chamber == chamber], ideal.command[ideal.chamber == chamber][0]
         if states[0] != begins and len(seen) and seen[0] <= sample_s + _SPARE_S:
-            states, due = states[1:], np.append(0.0, due)  # a switch at time 0: the first sample does not see it yet
-        if len(due) and len(due) == len(seen) + 1:  # one due between the last two samples, or at the very start
+            states, due = states[1:], np.append(0.0, due)  # a switch at time 0, not yet visible in the first sample
+        if len(due) and len(due) == len(seen) + 1:  # one more is due between the last two samples or at the start
             due = due[:-1] if due[-1] > time_s[-1] - sample_s else due[1:]
         if len(due) != len(seen) or (len(due) and states[0] != begins):
             return None

@@ -1,7 +1,7 @@
-"""The robot and its bench as a `System`: what `bifa fit` and `bifa diagnose` run on.
+"""The robot and its bench as a `System`, the engine's interface for `bifa fit` and `bifa diagnose`.
 
-Displacements of single actuators are those of the data set (0 where the testing machine says 0); the simulator counts
-from K's own contracted zero, so the two differ by that zero, which is 0 where the lab set its instruments well.
+Displacements of single actuators are those of the data set (0 where the testing machine reads 0). The simulator counts
+from the contracted equilibrium of K, so the two differ by its position, which is 0 if the instruments were zeroed well.
 """
 
 from __future__ import annotations
@@ -41,24 +41,24 @@ from lacuna.system import (
     Theta,
 )
 
-_REMEMBERED = ("_plant", "_own_values", "_unfitted", "_shapes")  # by a system, for speed
-FRICTION_WOBBLE = 0.01  # from run to run, relative
+_REMEMBERED = ("_plant", "_own_values", "_unfitted", "_shapes")  # cached attributes of a system, not pickled
+FRICTION_WOBBLE = 0.01  # relative standard deviation of friction from run to run
 _ADC_COUNT_PSI = 30.0 / 819.0  # 10 bits, 10-90 % of the supply over +-15 psi
 _EXACT_M = {STATIC: 1e-6, STEP: 2e-7, ANCHOR: 1e-6, WALK: 3e-7}
 _COARSE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-6}
-_ALIKE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-5}  # shared steps err alike: differences are better
+_ALIKE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-5}  # errors of shared steps cancel in differences
 
 _LARGE = ("body_damping_Ns_m", "body_area_N_psi", "body_alpha_n_per_s", "body_alpha_s_per_s")
 _SMALL = ("small_damping_Ns_m", "small_area_N_psi", "small_alpha_n_per_s", "small_alpha_s_per_s")
 PIPE = ("wall_offset_m", "mu_s", "mu_k")
-# A pull fits about as well with a wall nearer by a centimetre and less friction; only walks tell.
+# A pull fits about as well with the wall a centimetre nearer and less friction; only walks distinguish the two.
 _PLACES = {"wall_offset_m": (0.017, 0.022, 0.026, 0.031)}
 _SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
 _WALL = ("wall_stiffness_N_m", "wall_damping_Ns_m")
 _MACHINE = {"displacement_mm": "the cross-head", "force_N": "the load cell"}  # what a testing machine measures
 _MASSES = ("head_mass_kg", "tail_mass_kg", "small_mass_kg")
 _FELT = {STAND_MASS: (STEP, "large"), LOAD_CELL: (ANCHOR, None)}
-# Which experiments see which parameters; the shapes of the curves are added in `matters`.
+# The parameters that each experiment depends on; `matters` adds the shapes of the curves.
 _SEEN_BY: dict[tuple[str, str | None], frozenset[str]] = {
     (STATIC, "large"): frozenset({"body_area_N_psi"}),
     (STATIC, "small"): frozenset({"small_area_N_psi"}),
@@ -72,10 +72,10 @@ _SEEN_BY: dict[tuple[str, str | None], frozenset[str]] = {
 class RobotSystem(System):
     """The robot's base model, its library of effects, and the trials of a data set.
 
-    model: values from which the search starts, and those that are not searched.
+    model: initial values of the fitted parameters, and values of the others.
     curves: the fitted stiffness curves, "body" and "small"; their shapes are parameters. An actuator without one keeps
-        the model's.
-    fitted: names of the model's parameters to be searched.
+        the model's curve.
+    fitted: names of the model's parameters to be fitted.
     """
 
     name = "pipe robot"
@@ -84,12 +84,12 @@ class RobotSystem(System):
         _refuse_dead_machine(dataset)
         self.dataset, self.model, self.curves = dataset, model, dict(curves)
         self.fitted = tuple(fitted)
-        self.accuracies: Mapping[str, float] = {}  # RMS by quantity, up to which a prediction is good enough
+        self.accuracies: Mapping[str, float] = {}  # by quantity, the RMS error below which a prediction is good enough
         self.trials = tuple(_engine_trial(trial) for trial in dataset.trials)
         self._last_in_session = max((t.session_order or 0 for t in self.trials), default=0)
         self.effects: Mapping[str, Effect] = engine_effects()
         shapes = [p for curve in self.curves.values() for p in curve.parameters]
-        # constants of the bench that these trials feel and nobody declared
+        # constants of the bench that these trials depend on and that were not declared
         felt = {(t.experiment, t.actuator) for t in dataset.trials if LOAD_CELL not in t.extra}
         bench = (BENCH[name] for name, where in _FELT.items() if where in felt)
         self.parameters = (*(self._named(name) for name in self.fitted), *bench, *shapes)
@@ -102,7 +102,7 @@ class RobotSystem(System):
         self._shapes = {prefix: _picked(curve.names) for prefix, curve in self.curves.items()}
 
     def __getstate__(self) -> dict[str, Any]:
-        """What travels to another process: all but what is remembered."""
+        """State for pickling, without the caches."""
         return {n: value for n, value in vars(self).items() if n not in _REMEMBERED}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -122,10 +122,10 @@ class RobotSystem(System):
     ) -> Channels:
         return self.predict_trials([theta], effects, [trial], coarse=coarse, corrections=[corrections])[0]
 
-    forks = True  # compiled code without threads or state of its own
+    forks = True  # the compiled code has neither threads nor state
 
     @property
-    def at_once(self) -> int:  # type: ignore[override]  # not before it is asked for: it may compile
+    def at_once(self) -> int:  # type: ignore[override]  # a property, since the call may compile
         return lanes.width()
 
     def predict_trials(
@@ -138,7 +138,7 @@ class RobotSystem(System):
         corrections: Sequence[Sequence[Correction]] = (),
         alike: bool = False,
     ) -> list[Channels]:
-        """Each of `thetas` in its trial, those on one bench side by side."""
+        """Predict each trial at its own theta. Trials with the same `bench` are simulated side by side."""
         learnt = corrections or [()] * len(thetas)
         benches: dict[Hashable, dict[int, RobotInTrial[Inputs]]] = defaultdict(dict)
         for k, (theta, curves, trial) in enumerate(zip(thetas, learnt, trials, strict=True)):
@@ -158,8 +158,8 @@ class RobotSystem(System):
     def _case(
         self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record
     ) -> RobotInTrial[Inputs] | None:
-        """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
-        # 0 for the day's first trial, or where the order was not noted; 1 for its last
+        """A robot in a trial; None if there is no such robot because its stiffness curve is not bistable."""
+        # 0 for the day's first trial, or if the order was not recorded; 1 for its last
         place = (trial.session_order or 0) / max(self._last_in_session, 1)
         try:
             plant, zeros = self._plant(self._key(theta, effects))
@@ -183,7 +183,7 @@ class RobotSystem(System):
             source = "the valves switched between two samples"
             found.append(Parameter("switch_late_s", "s", 0.0, -3.0 * sd, 3.0 * sd, scale=sd, source=source))
         if trial.experiment == ANCHOR:
-            # Repeats are sampled alike, so that the same half sample may be missed in all of them.
+            # Repeats are sampled at the same times, so that the same half sample may be missing in all of them.
             half_s = 0.5 * trial.payload.sample_s
             alike = sum(other.condition == trial.condition for other in self.trials)
             sd, source = half_s * np.sqrt(max(alike, 1) / 3.0), "the peak lies between two samples"
@@ -213,7 +213,7 @@ class RobotSystem(System):
         return accuracy_of(channel, self.accuracies)
 
     def sensor_noise(self, experiment: str, channel: str) -> float:
-        """A converter's count is the least that a pressure can be uncertain by."""
+        """The quantisation noise of the analog-to-digital converter for pressures; 0 for the others."""
         return _ADC_COUNT_PSI / np.sqrt(12.0) if channel.startswith("pressure") else 0.0
 
     @cached_property
@@ -229,7 +229,7 @@ class RobotSystem(System):
     # -- from a vector to a model -----------------------------------------------------------------------------
 
     def model_at(self, theta: Theta, effects: Iterable[str] = ()) -> Model:
-        """The model with the values of `theta`, springs included, and these effects active; nothing learnt."""
+        """The model with the values of `theta`, springs included, and these effects active, without learnt curves."""
         values = {name: theta[name] for name in self.fitted}
         chosen = {
             effect: {p.name: theta[f"{effect}.{p.name}"] for p in self.effects[effect].parameters} for effect in effects
@@ -237,7 +237,7 @@ class RobotSystem(System):
         curves: dict[str, Any] = {
             f"{prefix}_stiffness": curve.curve(self._shapes[prefix](theta)) for prefix, curve in self.curves.items()
         }
-        # Learnt curves and a covariance go with the values of the fit that they come from.
+        # Learnt curves and a covariance belong to the values of the fit that they come from.
         base = replace(self.model, learnt={}, covariance=None)
         return replace(base.with_values(values).with_effects(chosen), **curves)
 
@@ -245,16 +245,16 @@ class RobotSystem(System):
         p = self.model.parameters[name]
         low, high = p.plausible
         prior_sd = PRIOR_SD.get(name)
-        # friction shows in fewer samples: wider steps for its derivatives
+        # friction affects fewer samples: wider steps for its derivatives
         scale = prior_sd or (high - low) * (1.0 if name in PIPE else 0.1)
-        # A foot that slides at once has no static friction to find: below mu_k nothing would lead mu_s back.
+        # An end that slides at once shows no static friction: below mu_k, no gradient would bring mu_s back.
         at_least, elsewhere = "mu_k" if name == "mu_s" else None, _PLACES.get(name, ())
         return Parameter(
             name, p.unit, p.value, p.lower, p.upper, p.plausible, scale, p.source, prior_sd, at_least, elsewhere
         )
 
     def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple[Any, ...]:
-        """All that a plant depends on, hashable."""
+        """A hashable key of everything that a plant depends on."""
         weights = tuple((prefix, shapes(theta)) for prefix, shapes in self._shapes.items())
         all_of = {effect: self.effects[effect].parameters + self.effects[effect].own for effect in effects}
         extra = tuple(
@@ -264,7 +264,7 @@ class RobotSystem(System):
         return self._own_values(theta), weights, extra
 
     def _plant_of(self, key: tuple[Any, ...]) -> tuple[Plant, tuple[float, float]]:
-        """The compiled code's form of a model, and K's contracted zeros of body and small actuator."""
+        """The model for compiled code, and the contracted equilibria of K for the body and a small actuator."""
         named, weights, extra = key
         shapes = dict(weights)
         body, small = (
@@ -278,8 +278,8 @@ class RobotSystem(System):
 
 
 def _refuse_dead_machine(dataset: Dataset) -> None:
-    """DatasetError where a channel of the testing machine never changes: no cross-head rests all the time, and a fit
-    would take a dead load cell for the robot."""
+    """Raise DatasetError if a channel of the testing machine never changes: a cross-head always moves, and a fit would
+    attribute a dead load cell to the robot."""
     for trial in (*dataset.of(STATIC), *dataset.of(ANCHOR)):
         for column, instrument in _MACHINE.items():
             if np.ptp(values := trial.columns[column]) == 0.0:
@@ -292,13 +292,13 @@ def _refuse_dead_machine(dataset: Dataset) -> None:
 
 
 def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, ...]:
-    """Names of the model's parameters that these trials see and the lab does not know."""
+    """Names of the model's parameters that these trials depend on and the data set does not declare as known."""
     seen = {name for trial in dataset.trials for name in _SEEN_BY[trial.experiment, trial.actuator]}
     return tuple(n for n in robot.nominal().parameters if n in seen and n not in dataset.known)
 
 
 def _simulated(cases: Sequence[RobotInTrial[Inputs]], tolerance_m: float, alike: bool) -> list[Columns]:
-    """The channels of each case on one bench; none of one that is out of range."""
+    """Simulate the cases of one bench. Returns the channels of each, empty if it is out of range."""
     try:
         return cases[0].inputs.simulate(cases, tolerance_m, alike)
     except BifaError:
@@ -312,8 +312,8 @@ def _nothing(trial: Record) -> Channels:
 
 
 def _picked(names: Sequence[str]) -> Callable[[Theta], tuple[float, ...]]:
-    """A function that picks these of a mapping's values: it is called for every simulation."""
-    if len(names) < 2:  # of one name itemgetter would make no tuple
+    """A function that picks these values from a mapping, as a tuple. It must be fast: every simulation calls it."""
+    if len(names) < 2:  # itemgetter would not return a tuple
         return lambda theta: tuple(theta[name] for name in names)
     return itemgetter(*names)
 
@@ -330,7 +330,7 @@ def _engine_trial(trial: Trial, measured: bool = True) -> Record:
 
 
 def _altered(plant: Plant, trial: Record, theta: Theta, positive_psi: float | None) -> Plant:
-    """`plant` as it is in one trial: its friction, its supply, and what moves on the stand."""
+    """`plant` in one trial, with that trial's friction, supply and mass moving on the stand."""
     friction = theta.get("friction_scale", 1.0)
     q = plant.q.copy()
     q[layout.MU_S] *= friction

@@ -1,16 +1,16 @@
-"""What nobody measured is uncertain, not fixed: priors for what the experiments can hardly tell.
+"""Priors for quantities that were not measured and that the experiments hardly determine.
 
-A stand's moving mass is not the robot's, the load cell and the wall are not the nominal ones. Held at a value that is
-wrong they make discoveries (a stand's mass of 0.05 kg where the model has 0.175 leaves 0.6 floors in the pressure of
-every step response); left free the fit stalls, since hardly anything depends on them. So each has a prior about the
-nominal value; what `[known]` declares is known.
+The moving mass on a stand is not the robot's, and the load cell and the wall are not the nominal ones. Fixed at a wrong
+value, they lead to false discoveries (a stand's mass of 0.05 kg where the model has 0.175 leaves 0.6 floors in the
+pressure of every step response). Left free, they stall the fit, since hardly anything depends on them. Each therefore
+has a prior around its nominal value, unless `[known]` declares its value.
 """
 
 from __future__ import annotations
 
 from lacuna.system import Parameter
 
-# Standard deviation of the prior about the model's value, for its parameters that [known] may declare.
+# Standard deviation of the prior around the model's value, for parameters that [known] may declare.
 PRIOR_SD = {
     "head_mass_kg": 0.02,
     "tail_mass_kg": 0.02,
@@ -22,7 +22,7 @@ PRIOR_SD = {
 
 STAND_MASS, LOAD_CELL = "stand_mass_kg", "load_cell_N_m"
 
-# Of the bench, not of the robot.
+# Parameters of the bench, not of the robot.
 BENCH = {
     STAND_MASS: Parameter(
         STAND_MASS,
@@ -32,7 +32,7 @@ BENCH = {
         0.5,
         plausible=(0.02, 0.25),
         scale=0.05,
-        source="half the robot; on a stand the large actuator moves what is mounted on it",
+        source="half the robot's mass; on a stand, the large actuator moves whatever is mounted on it",
         prior_sd=0.1,
     ),
     LOAD_CELL: Parameter(

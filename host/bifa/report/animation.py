@@ -1,6 +1,6 @@
-"""Walks as they look from the side: an SVG that moves by itself (CSS, no script), to scale, with its clock.
+"""Walks seen from the side: an animated SVG (CSS, no script), to scale, with a clock.
 
-It stands still for who asks for less motion, and is in the reader's colours, on a page and as a picture of its own.
+It does not move if the reader prefers reduced motion, and uses the reader's colour scheme, in a page or as a file.
 """
 
 from __future__ import annotations
@@ -12,24 +12,24 @@ import numpy as np
 
 from bifa.report.style import PALETTES
 
-FRAMES_PER_S = 8  # between which the browser goes on evenly
+FRAMES_PER_S = 8  # the browser interpolates in between
 PIPE_MM = 147.0  # inner diameter (paper, section II)
 LENGTH_MM = 186.0  # from tail to head when contracted: 240 mm extended less the body's stroke
 ANCHORED_MM, FREE_MM = PIPE_MM, 0.72 * PIPE_MM
 _BODY_MM, _END_MM, _WALL_MM = 52.0, 24.0, 4.0
 _MARGIN_MM, _LABEL_MM, _RULER_MM = 16.0, 46.0, 46.0
 _GROUND = '<rect width="100%" height="100%" fill="var(--paper)"/>'
-_SHORT_MM = 640.0  # up to which lettering is as large as it stands here; in longer pictures it grows with them
+_SHORT_MM = 640.0  # width up to which lettering has its nominal size; in wider pictures it grows with them
 
 
 def animate_walks(
     lanes: Mapping[str, Mapping[str, np.ndarray]], seconds: float, title: str, standalone: bool = False
 ) -> str:
-    """Walks over one another in pipes of their own, as an SVG element that repeats for ever and shows the whole record
-    in `seconds`.
+    """Draw walks in pipes one above the other, as an SVG element that repeats for ever and shows the whole record in
+    `seconds`.
 
-    lanes: by what stands above each, the columns of a locomotion trial with `displacement_tail_mm`, arrays of shape
-    (n,), all over the time of the first. standalone: with colours of its own, for a file.
+    lanes: by label, the columns of a locomotion trial with `displacement_tail_mm`, arrays of shape (n,); all are shown
+    over the time of the first. standalone: include the colours, for a file.
     """
     time_s = np.asarray(next(iter(lanes.values()))["time_s"], float)
     frames_s = np.linspace(time_s[0], time_s[-1], max(2, round(FRAMES_PER_S * seconds)))
@@ -47,7 +47,7 @@ def animate_walks(
         top = number * lane_mm
         middle = top + label_mm + _WALL_MM + PIPE_MM / 2
         tail, head = path["tail"] + left, path["head"] + left + LENGTH_MM
-        # of natural size: a browser that stops an animation shows a shape of one unit, enlarged, as a blur
+        # draw shapes at natural size: enlarged from one unit, they would be blurred when a browser pauses the animation
         parts = {
             "body": (0.0, LENGTH_MM, _BODY_MM, _moves(tail, middle, "X", (head - tail) / LENGTH_MM)),
             "tail": (-_END_MM / 2, _END_MM, PIPE_MM, _moves(tail, middle, "Y", path["tail_mm"] / PIPE_MM)),
@@ -80,7 +80,7 @@ def _look(zoom: float) -> str:
 
 
 def _paths(columns: Mapping[str, np.ndarray], frames_s: np.ndarray) -> dict[str, np.ndarray]:
-    """Way of both ends, and how far their supports reach across the pipe: that follows the chamber's pressure."""
+    """Displacement of both ends, and how far their supports reach across the pipe, drawn after the pressure."""
     found = {}
     for end in ("head", "tail"):
         found[end] = np.interp(frames_s, columns["time_s"], columns[f"displacement_{end}_mm"])
@@ -111,13 +111,13 @@ def _lane(label: str, pipe: float, width: float) -> str:
 
 
 def _ruler(y: float, zero: float, far_mm: float, zoom: float) -> str:
-    """A scale in mm along the pipe."""
+    """Draw a scale in mm along the pipe."""
     places = np.arange(0, far_mm + 1e-6, _step(far_mm, 12))
     return _scale(y, zero, far_mm, [(zero + place, f"{place:g}") for place in places], "mm", zoom)
 
 
 def _clock(y: float, width: float, frames_s: np.ndarray, zoom: float) -> str:
-    """A line of the walk's time with a dot that runs along it."""
+    """Draw a time axis of the walk with a dot that runs along it."""
     lasts, long = frames_s[-1] - frames_s[0], width - 2 * _MARGIN_MM
     places = np.arange(0, lasts + 1e-6, _step(lasts, 10))
     marks = [(_MARGIN_MM + long * place / lasts, f"{place:g}") for place in places]
@@ -130,7 +130,7 @@ def _step(reach: float, most: int) -> float:
 
 
 def _scale(y: float, start: float, long: float, marks: list[tuple[float, str]], unit: str, zoom: float) -> str:
-    """A line with a labelled mark at each place; every other one is `minor`, left out where there is little room."""
+    """Draw a line with labelled marks; every other label is `minor`, hidden if there is little room."""
     drawn = [f'<path d="M{start:.0f} {y:.0f}h{long:.0f}" stroke="var(--quiet)"/>']
     for number, (x, label) in enumerate(marks):
         minor = ' class="minor"' if number % 2 else ""

@@ -1,4 +1,4 @@
-"""What a figure shows, said once: drawn as a picture (`picture`) or as a plot that can be zoomed (`plot`)."""
+"""Description of a figure, to be drawn as a picture (`picture`) or as a zoomable plot (`plot`)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 class Series:
     """Values y over x, arrays of shape (n,). `color`: a role of `style.LIGHT`.
 
-    keys: the entries of the legend that it belongs to; it is drawn while all of them are switched on.
+    keys: legend entries that the series belongs to; it is drawn while all of them are switched on.
     style: "line", "dashed", "dotted", "dots", "steps" (each y holds until the next) or "area"
     (between `base` and y, in steps).
     """
@@ -28,7 +28,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Axis:
-    """ticks: labels at their places, where numbers would say nothing."""
+    """An axis. ticks: labels and their places, where numbers would be meaningless."""
 
     label: str = ""
     range: tuple[float, float] | None = None
@@ -37,7 +37,7 @@ class Axis:
 
     @property
     def log_ticks(self) -> list[float] | None:
-        """Ticks of a logarithmic axis over less than two decades, on which powers of ten would be one mark or none."""
+        """Ticks of a logarithmic axis over less than two decades, on which few or no powers of ten fall."""
         if not self.log or self.range is None or self.range[1] >= 100.0 * self.range[0]:
             return None
         low, high = self.range
@@ -47,7 +47,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """rules: dotted lines across the panel, (axis "x" or "y", place, what it is)."""
+    """One plot. rules: dotted lines across it, as (axis "x" or "y", place, label)."""
 
     series: Sequence[Series]
     x: Axis = field(default_factory=Axis)
@@ -67,7 +67,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Column:
-    """Panels over one another that share their x axis."""
+    """Panels one above the other that share their x axis."""
 
     panels: Sequence[Panel]
     title: str = ""
@@ -75,10 +75,9 @@ class Column:
 
 @dataclass(frozen=True)
 class Chart:
-    """Columns beside one another where there is room. `alt` says in words what it shows.
+    """Columns, side by side if there is room. `alt` describes in words what the chart shows.
 
-    title: above a picture. across: so many columns beside one another at most. height: of one unit of a panel's
-    height, in pixels.
+    title: shown above a picture. across: most columns side by side. height: pixels per unit of a panel's height.
     """
 
     columns: Sequence[Column]
@@ -91,7 +90,7 @@ class Chart:
 
 
 def thinned(x: np.ndarray, y: np.ndarray, most: int = 500) -> tuple[np.ndarray, np.ndarray]:
-    """At most about `most` points, among them the least and the greatest of each stretch."""
+    """Reduce a curve to about `most` points, keeping the minimum and maximum of each stretch."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     if len(y) <= most:
         return x, y
@@ -105,7 +104,7 @@ def thinned(x: np.ndarray, y: np.ndarray, most: int = 500) -> tuple[np.ndarray, 
 
 
 def edges(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values that hold until the next, reduced to where they change, and the ends."""
+    """Reduce values that hold until the next one to the points where they change, and the ends."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     at = np.flatnonzero(np.concatenate(([True], np.diff(y) != 0, [False])))
     at = np.append(at, len(y) - 1)

@@ -1,4 +1,4 @@
-"""Measured curves beside those of one model or of two, and the difference: the first run of each condition."""
+"""Curves of the first run of each condition: measured, by one or two models, and the difference."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _MOST = 300  # points of a curve
 def compared_curves(
     trials: Sequence[Record], predictions: Mapping[str, Sequence[Channels]], labels: Mapping[str, str]
 ) -> list[ChartedSection]:
-    """A section for each experiment.
+    """Plot measurements and predictions, one section per experiment.
 
-    predictions: by model (`BASE`, `COMPLETED`), one for each of `trials`. labels: what trials are called, by file.
+    predictions: by model (`BASE`, `COMPLETED`), one for each of `trials`. labels: names of the trials, by file.
     """
     keys = [Key(MEASURED, "measured"), *(Key(model, *_LOOKS[model]) for model in predictions)]
     first = {trial.condition: k for k, trial in reversed(list(enumerate(trials)))}
@@ -55,7 +55,7 @@ def _column(trial: Record, predictions: Mapping[str, Channels], label: str) -> C
             off.append(Series((model,), *thinned(x, measured - modeled, _MOST), _LOOKS[model][0]))
         unit = unit_of(channel)
         panels.append(Panel(both, over, Axis(f"{channel_words(channel).rpartition(' of the ')[2]}, {unit}")))
-        panels.append(Panel(off, over, Axis(f"off, {unit}"), height=0.55))
+        panels.append(Panel(off, over, Axis(f"error, {unit}"), height=0.55))
     return Column(panels, label)
 
 

@@ -1,4 +1,4 @@
-"""A picture of every condition of a data set, its repeats over each other."""
+"""A picture of every condition of a data set, with its repeats superimposed."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from bifa.report.picture import draw_chart
 from bifa.report.style import CHAMBERS
 from bifa.report.words import channel_words, unit_of
 
-_MAX_POINTS = 4000  # a pixel shows no more; the extremes of each stretch are kept
-_APART = 1.3  # rows of commands
+_MAX_POINTS = 4000  # pixels would show no more; the extremes of each stretch are kept
+_APART = 1.3  # distance between rows of commands
 _REPEATS = ("ink", "after", "before", "quiet")
 
 
@@ -31,8 +31,8 @@ def plot_dataset(dataset: Dataset, folder: Path) -> list[Path]:
 
 
 def condition_chart(group: Sequence[Trial], condition: str) -> Chart:
-    """Repeats of one `condition`: against displacement for a static loading or a pull, against time for the others; a
-    panel a quantity. A chamber has its own colour; where there is none, a repeat has."""
+    """Plot the repeats of one `condition`: against displacement for a static loading or a pull, otherwise against time;
+    one panel per quantity. Colours tell chambers apart, or repeats in quantities without a chamber."""
     first = group[0]
     quasi_static = first.experiment in ("static_loading", "anchor_pull")
     abscissa = "displacement_mm" if quasi_static else "time_s"
@@ -58,7 +58,7 @@ def condition_chart(group: Sequence[Trial], condition: str) -> Chart:
 
 
 def _upward(what: str, names: Sequence[str]) -> Axis:
-    """Of commands, a row each, on at the top; of anything else its unit."""
+    """Return the y axis: a labelled row for each command, or the unit of any other quantity."""
     if not is_command(names[0]):
         return Axis(f"{what}, {unit_of(names[0])}")
     return Axis(what, ticks={channel_words(n).rpartition(" ")[2]: 0.5 + _APART * i for i, n in enumerate(names)})

@@ -28,7 +28,7 @@ RMS = "Errors are measured minus predicted, as root mean square (RMS)."
 RESIDUAL = "A residual is the measurement minus the prediction."
 NOISE_FLOOR = "The noise floor is how much runs of the same condition differ: no model can predict better."
 LOWERED = (
-    "Where a named effect explains part of that (a ripple, with another phase in every run), the floor is lowered."
+    "If a named effect explains part of that (such as a ripple with another phase in every run), the floor is lowered."
 )
 HELD_OUT = "Held-out trials were measured, but neither model was fitted to them."
 
@@ -36,7 +36,7 @@ Labels = Mapping[str, str]
 
 
 def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
-    """The engine's sentence on a verdict of `bifa diagnose --json`, effects in words and with their sizes."""
+    """Return the engine's sentence on a verdict of `bifa diagnose --json`, with effects and their sizes in words."""
     return engine_sentence(
         verdict, effects, remainder, lambda effect: effect_words(effect["name"], effect["parameters"])
     )
@@ -45,8 +45,8 @@ def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remaind
 def diagnosis_page(
     name: str, record: Mapping[str, Any], labels: Labels | None = None, curves: Sequence[ChartedSection] = ()
 ) -> Page:
-    """The page for a record of `bifa diagnose --json`; `labels`: what trials are called, by file; `curves`: sections
-    with what was measured beside what the models predict."""
+    """Make the page for a record of `bifa diagnose --json`. `labels` names the trials by file; `curves`: sections that
+    compare measurements with the models' predictions."""
     effects = record["effects"]
     return Page(
         f"Diagnosis of {name}",
@@ -58,7 +58,7 @@ def diagnosis_page(
 
 
 def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[ChartedSection]:
-    """What was found, and how far each model is off."""
+    """Sections on what was found, and on the errors of both models."""
     effects = record["effects"]
     found = []
     if effects:
@@ -69,7 +69,7 @@ def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[Cha
 
 
 def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
-    """How much each effect explains, how much weight is behind it, and what else it could be."""
+    """Sentences on how much each effect explains, its weight, and what else it could be."""
     said = ["The gap is the base model's error beyond the noise floor, on held-out trials."]
     for effect in effects:
         name = effect_words(effect["name"])
@@ -88,7 +88,7 @@ def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[ChartedSection]:
-    """What is left, what else was tried, what to heed and what to measure next: only what there is."""
+    """Sections on what is left, what else was tried, caveats, and what to measure next; empty ones are left out."""
     learnt, coming = record["learnt"], record["next_experiment"]
     said = [f"Added to the model: {curve['term']}, a curve over {curve['variable']}." for curve in learnt]
     left = [spoken(record["remainder"]["text"], labels)] if record["effects"] else []
@@ -106,7 +106,7 @@ def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[Cha
 
 
 def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any] | None = None) -> PageTable:
-    """Every number of every effect with its interval; `truth`: what the seal held, beside it."""
+    """Tabulate the parameters of every effect with their intervals; `truth` adds the sealed values."""
     rows = []
     names = dict.fromkeys([*(effect["name"] for effect in effects), *(truth or {})])
     found = {effect["name"]: effect for effect in effects}
@@ -122,7 +122,7 @@ def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any]
 
 
 def base_table(record: Mapping[str, Any]) -> list[PageTable]:
-    """The base model's parameters, fitted together with the named effects; none where the data remain unexplained."""
+    """Tabulate the base model's parameters, fitted jointly with the named effects; no table if data are unexplained."""
     rows = []
     for name, one in record["base_parameters"].items():
         if name in BASE_PARAMETERS:  # not the coefficients of a curve's shape
@@ -138,7 +138,7 @@ def _sized(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
 
 
 def nearest_table(record: Mapping[str, Any]) -> list[PageTable]:
-    """Explanations that were not chosen, and what each would close; no table where there are none."""
+    """Tabulate explanations that were not chosen, and the share of the gap that each closes; no table if none."""
     rows = [
         (" and ".join(effect_words(name) for name in near["effects"]), _percent(near["share_of_gap"]))
         for near in sorted(record["nearest"], key=lambda near: -(near["share_of_gap"] or 0.0))
@@ -151,7 +151,7 @@ def _percent(share: float | None) -> str:
 
 
 def noise_table(error: Mapping[str, Any]) -> PageTable:
-    """Errors before and after, of fitted and held-out trials and by experiment, against the floor."""
+    """Tabulate errors before and after, of fitted and held-out trials and by experiment, with the noise floor."""
     labels = {"fitted": "fitted", "held_out": "held-out", "held_out_conditions": "held-out, new conditions"}
     sides = ("before", "after", "noise_floor")
     rows = [
@@ -170,13 +170,13 @@ def _noise(value: float | None) -> str:
 
 
 def next_sentence(coming: Mapping[str, Any]) -> str:
-    """The experiment that would tell apart what this data cannot."""
+    """Describe the experiment that would tell apart what this data cannot."""
     separated = " from ".join(effect_words(name) for name in coming["separates"])
     return f"A further experiment would tell {separated}: {settings_words(coming)}."
 
 
 def settings_words(experiment: Mapping[str, Any]) -> str:
-    """ "static loading, large, 4 psi, 2 mm/s"."""
+    """Return the settings of an experiment in words, such as "static loading, large, 4 psi, 2 mm/s"."""
     said = [experiment_words(experiment["experiment"])]
     for name, value in experiment["settings"].items():
         if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""Charts of a diagnosis and of a campaign: error before and after, residuals, what was learnt, robustness of gaits."""
+"""Charts of a diagnosis and a campaign: error before and after, residuals, learnt curves, robustness of gaits."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ MODEL_KEYS = (Key(BASE, "before"), Key(COMPLETED, "after"))
 STANDING_MM_S = 0.5  # a robot that is slower slips in place
 _ROW_PX = 34
 _QUANTITIES = ("force", "displacement", "pressure")
-_COLORS = ("quiet", "before", "after")  # of gaits
+_COLORS = ("quiet", "before", "after")  # one per gait
 
 
 def errors_chart(error: Mapping[str, Any]) -> Chart:
-    """Before against after, against the floor, on a logarithmic axis.
+    """Plot the error before and after, and the noise floor, on a logarithmic axis.
 
     error: the `error` object of `bifa diagnose --json` (contracts, section 5), RMS in units of the noise.
     """
@@ -33,8 +33,8 @@ def errors_chart(error: Mapping[str, Any]) -> Chart:
 
 
 def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | None, alt: str) -> Chart:
-    """A row a name: the error of the base model and of the completed one, in units of the noise; `floor`: the least
-    that held-out trials allow."""
+    """Plot the errors of the base and the completed model, in units of the noise, one row per name. `floor`: the least
+    error that held-out trials allow."""
     rows = np.arange(len(pairs), 0, -1, dtype=float)
     links = [
         Series((BASE, COMPLETED), np.array(pair), np.array([row, row]), "quiet")
@@ -56,7 +56,7 @@ def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | No
         [Column([panel])],
         keys,
         alt,
-        f"No model predicts better than runs of the same condition agree: to {floor:.2f} on held-out trials."
+        f"No model can predict better than runs of the same condition agree: {floor:.2f} on held-out trials."
         if floor
         else "",
         across=1,
@@ -64,8 +64,8 @@ def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | No
 
 
 def learnt_chart(curve: Mapping[str, Any]) -> Chart:
-    """A curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
-    # Neither of the chambers' colours nor of the models': a row is a direction.
+    """Plot a curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
+    # A row is a direction, not a chamber.
     colors = ("ink", "after", "before", "quiet")
     rows = {row or "learnt": np.asarray(values, float) for row, values in curve["rows"].items()}
     series = [
@@ -92,7 +92,7 @@ def _bars(side: Mapping[str, Any]) -> dict[str, float]:
 
 
 def residual_charts(traces: Sequence[Mapping[str, Any]]) -> dict[str, Chart]:
-    """By quantity, the one that the base model misses most first: a small plot a condition, the worst first.
+    """Plot residuals by quantity, one small plot per condition; quantities and conditions in order of decreasing error.
 
     traces: as in residuals.json: label, channel, time_s, before, after, in units of the noise floor.
     """
@@ -121,12 +121,12 @@ def _residual_column(trace: Mapping[str, Any]) -> Column:
 
 
 def _label(trace: Mapping[str, Any]) -> str:
-    """What the trial is called; records of earlier versions have only its file."""
+    """Return the trial's label; records of earlier versions have only its file."""
     return trace.get("label") or trace["trial"].removesuffix(".csv").replace("_", " ")
 
 
 def _size(trace: Mapping[str, Any]) -> float:
-    """RMS of what the base model leaves."""
+    """RMS residual of the base model."""
     return float(np.sqrt(np.mean(np.square(trace["before"]))))
 
 
@@ -134,12 +134,12 @@ def _size(trace: Mapping[str, Any]) -> float:
 
 
 def standing_share(speeds: Sequence[float]) -> float:
-    """The share of robots that do not walk, 0 to 1."""
+    """Share of robots that do not walk, 0 to 1."""
     return float(np.mean(np.asarray(speeds) < STANDING_MM_S))
 
 
 def robustness_chart(speeds: Mapping[str, Sequence[float]], titles: Mapping[str, str]) -> Chart:
-    """The share of robots on which each gait is slower than a speed. `speeds`: by gait, mm/s, sorted."""
+    """Plot the share of robots on which each gait is no faster than a speed. `speeds`: by gait, in mm/s, sorted."""
     series, keys = [], []
     for (name, values), color in zip(speeds.items(), _COLORS, strict=False):
         share = 100.0 * np.arange(1, len(values) + 1) / len(values)

@@ -15,15 +15,15 @@ from bifa.report.picture import draw_chart
 from bifa.report.words import channel_words, experiment_words, parameter_words, plain, quantity, spoken, unit_of
 
 _CORRELATED = 0.9
-AS_NOISE = 1.1  # an error of so many times the noise is noise
+AS_NOISE = 1.1  # errors up to this many times the noise count as noise
 _OF_REPEATS = (
-    "Here it holds all that differs from run to run, also what an effect would explain (a ripple, its phase another in "
-    "every run); a diagnosis takes that out of it, so that its ratios are larger."
+    "Here it includes all that differs from run to run, even what an effect would explain (such as a ripple with "
+    "another phase in every run); a diagnosis takes that out of it, so that its ratios are larger."
 )
 
 
 def fit_page(found: Identification) -> Page:
-    """The page of an identification; the first run of each condition is drawn."""
+    """Make the page of an identification; the first run of each condition is plotted."""
     dataset = found.system.dataset
     worst = max(found.error.values())
     says = (
@@ -43,14 +43,14 @@ def fit_page(found: Identification) -> Page:
 
 
 def curves(found: Identification) -> list[ChartedSection]:
-    """What was measured beside the model, a section an experiment."""
+    """Compare measurements with the model, one section per experiment."""
     return compared_curves(
         found.fit.problem.trials, {BASE: found.fit.predictions()}, conditions_of(found.system.dataset)
     )
 
 
 def draw_curves(found: Identification, folder: Path) -> list[Path]:
-    """Those curves as PNG, a file an experiment, into `folder`; returns their paths."""
+    """Write those curves into `folder`, one PNG file per experiment; returns their paths."""
     written = []
     for section in curves(found):
         written.append(folder / f"{section.title.lower().replace(' ', '_')}.png")
@@ -59,7 +59,7 @@ def draw_curves(found: Identification, folder: Path) -> list[Path]:
 
 
 def parameters_and_remarks(found: Identification) -> list[ChartedSection]:
-    """Every parameter with its interval, and what there is to know about them."""
+    """Sections with every parameter and its interval, and with remarks on them."""
     return [
         ChartedSection("Parameters", tables=[_parameters(found)]),
         ChartedSection("Notes", [spoken(line) for line in remarks(found)]),
@@ -67,7 +67,7 @@ def parameters_and_remarks(found: Identification) -> list[ChartedSection]:
 
 
 def remarks(found: Identification) -> list[str]:
-    """Sentences on the curves, correlations, and what the data do not determine."""
+    """Sentences on stiffness curves, correlations, and what the data do not determine."""
     lines = []
     for actuator, static in found.statics.items():
         curve = static.stiffness
@@ -114,7 +114,7 @@ def _parameters(found: Identification) -> PageTable:
 
 
 def errors_table(found: Identification) -> PageTable:
-    """The error of each channel in its unit, and against the noise floor."""
+    """Tabulate the error of each channel in its unit, and relative to the noise floor."""
     rows = []
     for (experiment, channel), error in found.error.items():
         noise = found.fit.problem.floor.channels[experiment, channel]

@@ -1,4 +1,4 @@
-"""The optimiser's figures: sensitivity, speed against robustness, distribution. Speeds are settled ones."""
+"""The optimiser's figures: sensitivity, speed against robustness, distribution. All speeds are settled speeds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _BINS = 60
 
 
 def sensitivity_chart(scans: Sequence[Scan]) -> Chart:
-    """A panel a gait parameter; shaded: where nine robots in ten keep 90 % of the speed."""
+    """Plot the speed over each gait parameter; shaded: the range in which nine robots in ten keep 90 % of the speed."""
     keys = [Key("the model itself", "measured"), Key("10th percentile", "after"), Key("room", "grid", "area")]
     most = 1.05 * max(float(np.max(scan.nominal_mm_s)) for scan in scans)
     columns = []
@@ -30,7 +30,7 @@ def sensitivity_chart(scans: Sequence[Scan]) -> Chart:
 
 
 def front_chart(found: Front, chosen_mm_s: tuple[float, float]) -> Chart:
-    """Speed on the model against the speed that nine robots in ten reach."""
+    """Plot the speed that nine robots in ten reach against the speed on the model."""
     best = found.efficient & (found.nominal_mm_s > 0)
     order = np.argsort(found.nominal_mm_s[best])
     x, y = found.nominal_mm_s[best][order], found.quantile_mm_s[best][order]
@@ -45,7 +45,7 @@ def front_chart(found: Front, chosen_mm_s: tuple[float, float]) -> Chart:
 
 
 def distribution_chart(optimum: Optimum, others: Mapping[str, np.ndarray]) -> Chart:
-    """Speeds over the draws that the search never met; `others`: those of further gaits on the same draws."""
+    """Plot the speeds on robots that the search has not seen; `others`: speeds of other gaits on the same robots."""
     shown = {"this gait": optimum.speeds_mm_s, **others}
     top = max(1.0, *(speeds.max() for speeds in shown.values()))
     bins = np.linspace(0.0, 1.05 * top, _BINS)

@@ -1,4 +1,4 @@
-"""Pages without network or other files: the engine's with plots that zoom and an animation, and the live page."""
+"""Self-contained HTML pages: the engine's page with zoomable plots and an animation, and the live page."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _SLIDERS = (
 
 @dataclass(frozen=True)
 class ChartedSection(engine.Section):
-    """A section that shows charts and an animation as well."""
+    """A section that also shows charts and an animation."""
 
     charts: Sequence[Chart] = ()
     motion: Motion | None = None
@@ -44,8 +44,8 @@ class ChartedSection(engine.Section):
 
 @dataclass(frozen=True)
 class Motion:
-    """An animation: an SVG that runs by itself; trusted markup made by this package. It takes `seconds` to show
-    `shown_s` of a walk."""
+    """An animation: an SVG that runs by itself, as trusted markup of this package. It shows `shown_s` of a walk in
+    `seconds`."""
 
     svg: str
     seconds: float
@@ -54,7 +54,7 @@ class Motion:
 
 
 def render(page: Page) -> str:
-    """The page, whose sections are this module's, as one HTML document; all text is escaped."""
+    """Render the page, whose sections may be ChartedSections, as one HTML document; all text is escaped."""
     charts = [chart for section in page.sections if isinstance(section, ChartedSection) for chart in section.charts]
     plots = [as_plot(column, chart.height) for chart in charts for column in chart.columns]
     return _template("charted.html.jinja").render(
@@ -69,12 +69,12 @@ def render(page: Page) -> str:
 
 
 def write_page(page: Page, path: Path) -> None:
-    """Write the page, whole or not at all; TargetError where it cannot be written."""
+    """Write the page, as a whole or not at all; raises TargetError if it cannot be written."""
     write_text(path, render(page))
 
 
 def live_page() -> str:
-    """The document that `bifa.live.web` serves; what it shows and asks goes to where it came from."""
+    """Render the document that `bifa.live.web` serves; it exchanges data only with the server that it came from."""
     return _template("live.html.jinja").render(
         palettes=PALETTES,
         chambers=CHAMBERS,
@@ -87,27 +87,27 @@ def live_page() -> str:
 
 @cache
 def _template(name: str) -> jinja2.Template:
-    """Of this package or of the engine; all text is escaped."""
+    """Load a template of this package or of the engine; all text is escaped."""
     return engine.environment(jinja2.PackageLoader("bifa.report", "templates")).get_template(name)
 
 
 @cache
 def _library() -> Markup:
-    """Chart.js, its zoom and its rules, to be put into a page's script element, which they do not end."""
+    """Chart.js with its zoom and annotation plugins, for a page's script element, with closing tags escaped."""
     source = re.sub(r"//# sourceMappingURL=\S+", "", "\n".join(_file(f"vendor/{name}") for name in _LIBRARY))
     return Markup(re.sub(r"</(?=script)", r"<\\/", source, flags=re.IGNORECASE))
 
 
 def _style() -> Markup:
-    """The engine's rules, and those of charts and animations."""
+    """The engine's style sheet, and that of charts and animations."""
     return engine.style() + _file("templates/charts.css")
 
 
 def _file(name: str) -> Markup:
-    """A file of this package that goes into a page as it is."""
+    """Read a file of this package that goes into a page unchanged."""
     return Markup(files("bifa.report").joinpath(name).read_text(encoding="utf-8"))
 
 
 def _embedded(value: object) -> Markup:
-    """JSON that cannot end the element it stands in."""
+    """Convert to JSON that cannot end the element that it is embedded in."""
     return Markup(json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))

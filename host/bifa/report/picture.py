@@ -1,4 +1,4 @@
-"""A chart as a file: PNG, SVG or whatever else Matplotlib writes by the name's ending."""
+"""Charts as files: PNG, SVG or whatever else Matplotlib writes by the name's ending."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_PER_INCH = 75.0  # of a chart's pixels
+_PER_INCH = 75.0  # pixels of a chart per inch
 _DASHES: dict[str, Literal["--", ":"]] = {"dashed": "--", "dotted": ":"}
 
 
@@ -25,19 +25,11 @@ def draw_chart(chart: Chart, path: Path, width_in: float = 9.6) -> None:
     heights = [panel.height for panel in max((column.panels for column in chart.columns), key=len)]
     tall = rows * sum(heights) * chart.height / _PER_INCH + 0.35 * rows + 0.6
     import matplotlib
+    from matplotlib.figure import Figure  # not pyplot: the user's backend stays as it is
 
-    matplotlib.use("Agg")  # needs no display
     with matplotlib.rc_context(PICTURE):
-        import matplotlib.pyplot as plt
-
-        figure, axes = plt.subplots(
-            rows * len(heights),
-            across,
-            figsize=(width_in, tall),
-            height_ratios=heights * rows,
-            squeeze=False,
-            layout="constrained",
-        )
+        figure = Figure(figsize=(width_in, tall), layout="constrained")
+        axes = figure.subplots(rows * len(heights), across, height_ratios=heights * rows, squeeze=False)
         for axis in axes.flat:
             axis.set_visible(False)
         if chart.title:
@@ -58,7 +50,6 @@ def draw_chart(chart: Chart, path: Path, width_in: float = 9.6) -> None:
             figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 6))
         figure.align_ylabels()
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
-        plt.close(figure)
 
 
 def _draw(axis: Axes, panel: Panel) -> None:

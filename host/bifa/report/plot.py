@@ -1,4 +1,4 @@
-"""A chart for the page: what `page.js` hands to Chart.js, its colours by role, so that the reader's scheme decides."""
+"""Charts for the page: the data that `page.js` hands to Chart.js. Colours are roles; the page resolves them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bifa.report.chart import Axis, Column, Series
 
 
 def as_plot(column: Column, height: int) -> list[dict[str, Any]]:
-    """The panels of a column from the top, as plain types. `keys` of each curve are those that switch it."""
+    """Convert the panels of a column, from the top, to plain types. `keys` of a curve are those that switch it."""
     return [
         {
             "height": round(panel.height * height),

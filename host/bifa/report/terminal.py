@@ -1,4 +1,4 @@
-"""Pages on a terminal: the same tables and sentences, in the same words."""
+"""Pages on a terminal, with the same tables and sentences, in the same words."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from bifa.report.words import NBSP
 from bifa.screen import Console
 
 _BETWEEN = 3  # spaces between columns
-_NARROWEST = 8  # characters of a column of figures, where its heading needs more than that
+_NARROWEST = 8  # characters to which the heading of a numeric column may be wrapped
 
 
 def print_table(console: Console, content: PageTable) -> None:
-    """A table; figures are set to the right as on a page."""
+    """Print a table; numbers are right-aligned, as on a page."""
     table = rich.table.Table(
         title=content.caption or None, title_justify="left", box=rich.box.SIMPLE_HEAD, show_edge=False, pad_edge=False
     )
@@ -27,7 +27,7 @@ def print_table(console: Console, content: PageTable) -> None:
     for i, heading in enumerate(content.columns):
         if not i or (content.words and i == len(content.columns) - 1):
             table.add_column(heading)
-        else:  # rather the heads of figures in several lines than what they are of
+        else:  # wrap the headings of numeric columns before the row labels
             most = max(_NARROWEST, *map(len, [*heading.split(), *cells[i]])) if is_wide else None
             table.add_column(heading, justify="right", max_width=most)
     for row in content.rows:
@@ -37,13 +37,13 @@ def print_table(console: Console, content: PageTable) -> None:
 
 
 def print_lines(console: Console, lines: Iterable[str]) -> None:
-    """Sentences, one below the other, wrapped at the terminal's width."""
+    """Print sentences, one below the other, wrapped at the terminal's width."""
     for line in lines:
         console.print(plain_spaces(line))
 
 
 def print_sections(console: Console, sections: Iterable[ChartedSection]) -> None:
-    """Titles, sentences and tables of sections; what is drawn there is for pages."""
+    """Print titles, sentences and tables of sections; their charts are only for pages."""
     for section in sections:
         if section.paragraphs or section.tables:
             console.print(Text(f"\n{section.title}", "bold"))
@@ -53,5 +53,5 @@ def print_sections(console: Console, sections: Iterable[ChartedSection]) -> None
 
 
 def plain_spaces(text: str) -> str:
-    """Spaces that may break where a page's must not, so that narrow terminals can wrap."""
+    """Replace a page's no-break spaces by ordinary ones, so that narrow terminals can wrap."""
     return text.replace(NBSP, " ")

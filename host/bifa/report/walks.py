@@ -1,4 +1,4 @@
-"""Walks beside one another, in the manner of the paper's Fig. 7: CPG outputs, pressures, displacement."""
+"""Walks side by side, like the paper's Fig. 7: CPG outputs, pressures, displacement."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ MEASURED, SIMULATED = "measured", "simulated"
 _ROLES = {BASE: "before", COMPLETED: "after"}  # everything else is drawn in ink
 _ROW, _BAR = 1.2, 0.9
 _LINES = ("line", "dashed", "dotted")
-_MM = 60.0  # to which the path's axis is rounded up
+_MM = 60.0  # the path's axis ends at a multiple of this
 
 
 @dataclass(frozen=True)
 class Walk:
-    """One gait. `records`: what is drawn, by what it is called (`MEASURED`, `SIMULATED`, a model's name), the first
-    drawn solid; each the columns of a locomotion trial, arrays of shape (n,)."""
+    """One gait. `records`: what is drawn, by label (`MEASURED`, `SIMULATED`, a model's name), the first as solid lines;
+    each has the columns of a locomotion trial, arrays of shape (n,)."""
 
     title: str
     period_s: float
@@ -36,7 +36,7 @@ class Walk:
 
 
 def walks_chart(walks: Sequence[Walk]) -> Chart:
-    """All walks over the same time and way, so that the faster one looks faster: as long as the shortest record."""
+    """Plot all walks over equal times (that of the shortest record) and distances, so that faster ones look faster."""
     horizon_s = min(float(walk.first["time_s"][-1]) for walk in walks)
     furthest = max(float(_until(walk.first, "displacement_head_mm", horizon_s)[1].max()) for walk in walks)
     reach = (-0.05 * furthest, float(np.ceil(1.02 * furthest / _MM) * _MM))
@@ -62,7 +62,8 @@ def draw_walks(walks: Sequence[Walk], path: Path) -> None:
 def _column(
     walk: Walk, horizon_s: float, reach: tuple[float, float], span: tuple[float, float], lines: Mapping[str, str]
 ) -> Column:
-    """`reach`: of the path's axis, mm; `span`: of the pressures', psi; `lines`: the style of each record."""
+    """Plot one walk. `reach`: range of the path's axis, mm; `span`: range of the pressures' axis, psi; `lines`: line
+    style of each record."""
     time = Axis("time, s", (0.0, horizon_s))
     first = next(iter(walk.records))
     outputs = [

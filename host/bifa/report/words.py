@@ -1,4 +1,4 @@
-"""Names as people say them: quantities with units, effects with their sizes, and text without identifiers."""
+"""Names in plain words: quantities with units, effects with their sizes, and text without identifiers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from math import floor, log10
 from bifa.effects import library
 from bifa.robot.parameters import BASE_PARAMETERS
 
-# What an effect's numbers say in a phrase; one without a phrase has them listed with their meanings.
+# Phrases for the values of effects; without a phrase, an effect's values are listed with their meanings.
 _PHRASES = {
     "area_variation": "{slope} over the stroke",
     "backlash": "{gap_m}",
@@ -39,7 +39,7 @@ _FILE = re.compile(r"[\w.\-]+\.csv\b")
 
 
 def quantity(value: float, unit: str, digits: int = 2) -> str:
-    """A value in a unit that suits its size: 0.00274 m is "2.7 mm"."""
+    """Return a value in a unit that suits its size: 0.00274 m is "2.7 mm"."""
     for small, scale, least in (("m", ("mm", 1e3), 1.0), ("s", ("ms", 1e3), 1.0), ("m/s", ("mm/s", 1e3), 10.0)):
         if unit == small and abs(value) < least:
             unit, value = scale[0], value * scale[1]
@@ -48,7 +48,7 @@ def quantity(value: float, unit: str, digits: int = 2) -> str:
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """At least so many significant digits, and never an exponent where people would not write one."""
+    """Format with at least `digits` significant digits, and no exponent for values from 1e-4 to 1e6."""
     if value == 0.0 or not 1e-4 <= abs(value) < 1e6:
         return f"{value:.{digits}g}"
     decimals = max(0, digits - 1 - floor(log10(abs(value))))
@@ -56,12 +56,12 @@ def plain(value: float, digits: int = 3) -> str:
 
 
 def experiment_words(name: str) -> str:
-    """ "static_loading" is "static loading"; a walk is a walk."""
+    """Return an experiment's name in words: "static_loading" is "static loading", "locomotion" is "walk"."""
     return "walk" if name == "locomotion" else name.replace("_", " ")
 
 
 def channel_words(name: str) -> str:
-    """ "pressure_body_psi" is "pressure of the body"."""
+    """Return a channel's name in words: "pressure_body_psi" is "pressure of the body"."""
     words = _UNIT.sub("", name).split("_")
     if words[-1] in _PARTS and len(words) > 1:
         return f"{' '.join(words[:-1])} of the {words[-1]}"
@@ -69,12 +69,13 @@ def channel_words(name: str) -> str:
 
 
 def unit_of(name: str) -> str:
-    """The unit at a column's end: "psi" of "pressure_body_psi"."""
+    """Return the unit that a column's name ends in: "psi" for "pressure_body_psi"."""
     return name.rpartition("_")[2]
 
 
 def gait_words(gait: Mapping[str, float]) -> str:
-    """ "2.72 s, head 204° and tail 332° ahead, vacuum in 0.65 (body), 0.44 (head) and 0.44 (tail) of the cycle"."""
+    """Return a gait in words, such as "2.72 s, head 204° and tail 332° ahead, vacuum in 0.65 (body), 0.44 (head) and
+    0.44 (tail) of the cycle"."""
     head, tail = (f"{gait[f'psi1{i}_deg']:.0f}°" for i in (2, 3))
     body, front, rear = (f"{gait[f'duty_{part}']:.2f}" for part in _PARTS)
     vacuum = f"vacuum in {body} (body), {front} (head) and {rear} (tail) of the cycle"
@@ -82,19 +83,19 @@ def gait_words(gait: Mapping[str, float]) -> str:
 
 
 def gait_parameter_words(name: str) -> str:
-    """ "period, s" or "vacuum, body": one of a gait's numbers."""
+    """Return the name of a gait's parameter in words, such as "period, s" or "vacuum, body"."""
     words = {"period_s": "period, s", "psi12_deg": "head ahead, °", "psi13_deg": "tail ahead, °"}
     return words.get(name, name.replace("duty_", "vacuum, "))
 
 
 def parameter_words(name: str) -> str:
-    """A parameter of the model, an effect's, or a nuisance."""
+    """Return the name of a parameter in words: the model's, an effect's, or a nuisance."""
     known = BASE_PARAMETERS.get(name)
     return known.meaning if known else _UNIT.sub("", name).replace("_", " ")
 
 
 def effect_words(name: str, parameters: Mapping[str, float] | None = None) -> str:
-    """ "hysteresis, 4.4 N over 2.7 mm"; without parameters only what it is called."""
+    """Return an effect in words, such as "hysteresis, 4.4 N over 2.7 mm"; without parameters, only its name."""
     called = name.replace("_", " ")
     if not parameters:
         return called
@@ -108,7 +109,7 @@ def effect_words(name: str, parameters: Mapping[str, float] | None = None) -> st
 
 
 def effect_parameter(effect: str, name: str) -> tuple[str, str]:
-    """What a number of an effect means, and its unit; of an effect that the library lacks, its name and none."""
+    """Return the meaning and unit of an effect's parameter; if the library lacks the effect, its name and no unit."""
     effects = library()
     for parameter in effects[effect].parameters if effect in effects else ():
         if parameter.name == name:
@@ -117,7 +118,7 @@ def effect_parameter(effect: str, name: str) -> tuple[str, str]:
 
 
 def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
-    """Text of the engine with its identifiers in words; `labels`: what trials are called, by file."""
+    """Replace identifiers in a text of the engine by words; `labels` names the trials by file."""
     if labels:
         text = _FILE.sub(lambda found: labels.get(found[0], found[0]), text)
     text = (

@@ -1,4 +1,4 @@
-"""Which serial ports this computer has, and which of them look like an Uno by their USB identity."""
+"""The serial ports of this computer, and which of them look like an Uno by their USB identity."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ UNO_IDENTITIES = {
 
 @dataclass(frozen=True)
 class SerialPort:
-    """A port and what is known about the device behind it; `board` is None where it is no known Uno."""
+    """A port and what is known about the device behind it; `board` is None if it is not a known Uno."""
 
     device: str
     description: str
@@ -27,7 +27,7 @@ class SerialPort:
 
 
 def serial_ports() -> list[SerialPort]:
-    """Every USB serial port, Unos first, originals before copies."""
+    """Return all USB serial ports, Unos first, originals before copies."""
     ports = [
         SerialPort(
             port.device,
@@ -43,5 +43,5 @@ def serial_ports() -> list[SerialPort]:
 
 
 def uno_ports() -> list[SerialPort]:
-    """The ports behind which a known Uno is."""
+    """Return the ports that a known Uno is connected to."""
     return [port for port in serial_ports() if port.board]

@@ -1,4 +1,4 @@
-"""What is at the other end of `--port`: an Uno on a serial port, or a whole rig that a package offers by name."""
+"""What `--port` refers to: an Uno on a serial port, or a whole rig that a package offers by name."""
 
 import re
 from collections.abc import Mapping
@@ -15,14 +15,14 @@ ENTRY_POINTS = "bifa.rigs"
 
 
 class RigError(BifaError):
-    """No rig at the port asked for."""
+    """There is no rig at the requested port."""
 
 
 @runtime_checkable
 class Rig(Protocol):
-    """A transport and a clock that belong together, and the bench's instruments where there are any.
+    """A transport and a clock that belong together, and the bench's instruments, if any.
 
-    `known`: what was measured directly of the robot on this rig, by the model's names (`head_mass_kg`); {}: nothing.
+    `known`: values measured directly on this rig's robot, by the model's names (`head_mass_kg`); may be empty.
     """
 
     transport: Transport
@@ -31,10 +31,11 @@ class Rig(Protocol):
     known: Mapping[str, float]
 
     def next_session_seed(self) -> int | None:
-        """What makes the next session's key, and so every byte of it, repeatable; None where time is real anyway."""
+        """Return a seed for the next session's key, so that every byte of the session is repeatable; None on a rig in
+        real time, which is not repeatable anyway."""
 
     def close(self) -> None:
-        """Let go of everything; a second call does nothing."""
+        """Release all resources; a second call does nothing."""
 
     def __enter__(self) -> "Rig": ...
 
@@ -42,7 +43,7 @@ class Rig(Protocol):
 
 
 class SerialRig:
-    """An Uno on a serial port, in the computer's time; no instruments."""
+    """An Uno on a serial port, in real time, without instruments."""
 
     instruments = None
     known: Mapping[str, float] = MappingProxyType({})
@@ -66,7 +67,8 @@ class SerialRig:
 
 
 def find_port() -> str:
-    """The one Uno that is plugged in, by its USB identity; RigError with what there is otherwise."""
+    """Return the port of the only Uno that is plugged in, found by its USB identity. Raises RigError, listing the
+    ports, if there is none or several."""
     unos = uno_ports()
     if len(unos) == 1:
         return unos[0].device
@@ -81,12 +83,12 @@ def find_port() -> str:
 
 
 def is_offered(port: str | None) -> bool:
-    """Whether `port` is the name of a rig that a package offers, and not a serial port."""
+    """Whether `port` is the name of a rig that a package offers, not a serial port."""
     return port in entry_points(group=ENTRY_POINTS).names
 
 
 def check_port(port: str | None) -> None:
-    """Raise RigError where `port` cannot be one, before anything slow is done."""
+    """Raise RigError if `port` can be neither a rig nor a device, before anything slow is done."""
     rigs = entry_points(group=ENTRY_POINTS).names
     if port is not None and port not in rigs and not re.search(r"[/\\]|^COM", port, re.IGNORECASE):
         raise RigError(f"{port!r} is neither a rig (available: {', '.join(sorted(rigs)) or 'none'}) nor a device")

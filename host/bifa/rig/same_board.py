@@ -1,4 +1,4 @@
-"""A port that is reopened, but only for the board that was there first."""
+"""A port that can be reopened, but only for the board that it was first opened for."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,14 +7,14 @@ from bifa.link import NoAnswerError, PortGoneError, RestartedError, StillMovingE
 from bifa.rig.ports import serial_ports
 from bifa.rig.rig import RigError, open_rig
 
-# Errors of a board that may come back. RigError: no Uno is plugged in.
+# Errors after which the board may come back. RigError: no Uno is plugged in.
 GONE = (PortGoneError, NoAnswerError, RestartedError, StillMovingError, RigError)
-RETRY_S = 1.0  # until it is looked for again
+RETRY_S = 1.0  # time between attempts to find it
 
 
 class SameBoard:
-    """`open()` gives the rig at `port`; later only that of the same board, by the serial number of its USB chip,
-    wherever it is plugged in then. `serial_number` is None where the board has none: many copies do not."""
+    """`open()` opens the rig at `port`; later calls open only that of the same board, identified by the serial number
+    of its USB chip, at whichever port it is then. `serial_number` is None if the board has none, as many copies do."""
 
     def __init__(self, port: str | None, open_port: Callable[..., Any] = open_rig) -> None:
         self._port, self._open_port = port, open_port
@@ -22,7 +22,7 @@ class SameBoard:
         self.serial_number: str | None = None
 
     def open(self) -> Any:
-        """A Rig. Raises RigError or PortGoneError where that board is not plugged in; another is not even opened."""
+        """Open the Rig. Raises RigError or PortGoneError if that board is not plugged in; no other board is opened."""
         if self._was_there:
             return self._open_port(_port_of(self.serial_number) if self.serial_number else self._port)
         self.serial_number = _serial_number_at(self._port)
@@ -32,7 +32,7 @@ class SameBoard:
 
 
 def _serial_number_at(port: str | None) -> str | None:
-    """Serial number of the board behind `port`, or of the one Uno there is; None where it has none."""
+    """Serial number of the board behind `port`, or of the only Uno if `port` is None; None if it has none."""
     unos = [one for one in serial_ports() if (one.device == port if port is not None else one.board)]
     return unos[0].serial_number if len(unos) == 1 else None
 

@@ -13,13 +13,13 @@ LONGEST_DRAIN_S = 0.5  # 12 kB at this baud rate
 
 
 class SerialTransport:
-    """A port opened exclusively, so that no other program takes half of the bytes. Opening it resets an Uno."""
+    """A port opened exclusively, so that no other program reads part of the bytes. Opening it resets an Uno."""
 
     def __init__(self, device: str) -> None:
         self.device = device
         try:
             self._port = serial.Serial(device, BAUD, timeout=0, write_timeout=2.0, exclusive=True)
-        except Exception as error:  # pyserial lets termios.error pass, which Windows does not have
+        except Exception as error:  # pyserial also raises termios.error, which does not exist on Windows
             raise PortGoneError(why_unopened(device, error)) from error
 
     def write(self, data: bytes) -> None:
@@ -35,7 +35,7 @@ class SerialTransport:
             self._port.timeout = timeout_s
             first = self._port.read(1)
             return first + self._port.read(self._port.in_waiting) if first else b""
-        # pyserial: TypeError when closed meanwhile, ValueError when it sets the baud rate of a port that has just gone
+        # pyserial: TypeError if closed meanwhile, ValueError on setting the baud rate of a port that has just gone
         except (serial.SerialException, OSError, TypeError, ValueError) as error:
             raise self._gone() from error
 

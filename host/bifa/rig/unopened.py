@@ -1,4 +1,4 @@
-"""Why a serial port does not open, in one sentence: who has it, where the system tells."""
+"""Explain in one sentence why a serial port does not open, naming the program that uses it if the system tells."""
 
 import errno
 import os
@@ -9,11 +9,11 @@ from pathlib import Path
 from bifa.computer import PORT_BUSY, PORT_QUESTIONS, PORT_REFUSED
 
 _PROC = Path("/proc")
-_ON_WINDOWS = {"PermissionError": errno.EBUSY, "FileNotFoundError": errno.ENOENT}  # pyserial passes no number on there
+_ON_WINDOWS = {"PermissionError": errno.EBUSY, "FileNotFoundError": errno.ENOENT}  # pyserial sets no errno there
 
 
 def why_unopened(port: str, error: Exception) -> str:
-    """What to say about the error with which `port` did not open."""
+    """Return a message for the user about the error with which `port` did not open."""
     number = getattr(error, "errno", None)
     number = number or next((number for name, number in _ON_WINDOWS.items() if name in str(error)), None)
     if number in (errno.EBUSY, errno.EAGAIN):
@@ -22,25 +22,25 @@ def why_unopened(port: str, error: Exception) -> str:
     if number == errno.EACCES:
         return PORT_REFUSED.format(port=port)
     if number == errno.ENOENT:
-        return f"there is no port {port}: `bifa doctor` lists those there are"
+        return f"there is no port {port}: `bifa doctor` lists the available ones"
     return f"{port} does not open ({error}); {PORT_QUESTIONS}"
 
 
 def holder_of(port: str) -> str | None:
-    """The program that has locked `port` or, where none has, that has it open: `command` (process number); None where
+    """Return the program that has locked `port` or, if none has, that has it open: `command` (process number); None if
     the system does not tell."""
     pid = _locked_by(port) or _opened_by(port)
     if pid is None:
         return None
     words = (_PROC / str(pid) / "cmdline").read_bytes().rstrip(b"\0").decode("utf-8", "replace").split("\0")
-    if Path(words[0]).name.startswith("python") and len(words) > 1:  # the script says more than what runs it
+    if Path(words[0]).name.startswith("python") and len(words) > 1:  # name the script, not the interpreter
         words = ["bifa", *words[3:]] if words[1:3] == ["-m", "bifa"] else words[1:]
     return f"`{shlex.join([Path(words[0]).name, *words[1:]])}` (process {pid})"
 
 
 def _locked_by(port: str) -> int | None:
-    """From lines like `1: FLOCK ADVISORY WRITE 4711 fe:00:1027 0 EOF`. One that has ended still stands there while its
-    children keep its lock."""
+    """Process that holds the lock, from lines like `1: FLOCK ADVISORY WRITE 4711 fe:00:1027 0 EOF`. A process that has
+    ended is still listed while its children hold its lock."""
     with suppress(OSError, ValueError):
         stat = os.stat(port)
         place = f"{os.major(stat.st_dev):02x}:{os.minor(stat.st_dev):02x}:{stat.st_ino}"
@@ -52,7 +52,7 @@ def _locked_by(port: str) -> int | None:
 
 
 def _opened_by(port: str) -> int | None:
-    """Programs of other people are not seen."""
+    """Process that has the port open; processes of other users are not visible."""
     target = os.path.realpath(port)
     for link in _PROC.glob("[0-9]*/fd/*"):
         pid = int(link.parts[2])

@@ -1,7 +1,7 @@
-"""The central pattern generator on the host: eq. (9), thresholds, and the valve switches they give.
+"""The central pattern generator on the host: eq. (9), the thresholds, and the resulting valve commands.
 
-Phases settle at phi_j - phi_i = +psi_ij, so head and tail run ahead of the body by psi_12 and psi_13, and
-u_i = 1 (positive pressure) when the wrapped phase exceeds 2 pi d_i: a duty is the part of the cycle at vacuum.
+Phases settle at phi_j - phi_i = +psi_ij, so that head and tail run ahead of the body by psi_12 and psi_13. u_i = 1
+(positive pressure) when the wrapped phase exceeds 2 pi d_i: a duty is the fraction of the cycle at vacuum.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from bifa.robot.gait import Gait
 
 COUPLING_PER_S = 10.0  # alpha_phi of eq. (9)
 CHAMBERS = ("body", "head", "tail")
-_STEP_S = 1e-3  # the robot's own rate
+_STEP_S = 1e-3  # the robot's own time step
 
 
 def phase_offsets_rad(gait: Gait) -> np.ndarray:
-    """(3,) phase of body, head, tail ahead of the body once settled."""
+    """Phases of body, head and tail ahead of the body once settled, shape (3,)."""
     return np.radians([0.0, gait.psi12_deg, gait.psi13_deg])
 
 
 def duties(gait: Gait) -> np.ndarray:
-    """(3,) vacuum fractions of body, head, tail."""
+    """Fractions of the cycle at vacuum for body, head and tail, shape (3,)."""
     return np.array([gait.duty_body, gait.duty_head, gait.duty_tail])
 
 
 def phase_rates(phases_rad: np.ndarray, gait: Gait, coupling_per_s: float = COUPLING_PER_S) -> np.ndarray:
-    """Eq. (9): (3,) rates in rad/s for (3,) phases."""
+    """Rates in rad/s by eq. (9), shape (3,), for phases (3,)."""
     offsets = phase_offsets_rad(gait)
     psi = offsets[None, :] - offsets[:, None]
     difference = phases_rad[None, :] - phases_rad[:, None] - psi
@@ -37,14 +37,15 @@ def phase_rates(phases_rad: np.ndarray, gait: Gait, coupling_per_s: float = COUP
 
 
 def outputs(phases_rad: np.ndarray, gait: Gait) -> np.ndarray:
-    """u of section V.A: 1 where the wrapped phase exceeds 2 pi d, else 0."""
+    """The outputs u of section V.A: 1 where the wrapped phase exceeds 2 pi d, else 0."""
     return (np.mod(phases_rad, 2.0 * math.pi) > 2.0 * math.pi * duties(gait)).astype(np.int64)
 
 
 def phases(
     gait: Gait, time_s: np.ndarray, initial_rad: ArrayLike, coupling_per_s: float = COUPLING_PER_S
 ) -> np.ndarray:
-    """(n, 3) phases at increasing times from `initial_rad` at time 0: eq. (9) by fourth-order Runge-Kutta steps."""
+    """Integrate eq. (9) from `initial_rad` at time 0, by fourth-order Runge-Kutta steps. Returns phases (n, 3) at the
+    increasing times `time_s`."""
     time_s = np.asarray(time_s, dtype=float)
     state = np.array(initial_rad, dtype=float)
     result = np.empty((time_s.size, 3))

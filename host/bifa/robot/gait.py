@@ -1,4 +1,4 @@
-"""A gait: the six numbers that the CPG (9) and the thresholds need (paper, section V), and its file."""
+"""A gait, the six parameters of the CPG (9) and its thresholds (paper, section V), and gait files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FORMAT = 1
 
 
 class GaitError(BifaError):
-    """A gait or its file is not usable; the text names the value and the range."""
+    """A gait or its file is invalid; the text names the value and the range."""
 
 
 def _checked(name: str, value: float) -> float:
@@ -30,7 +30,8 @@ def _checked(name: str, value: float) -> float:
 
 @dataclass(frozen=True)
 class Gait:
-    """`psi12_deg`, `psi13_deg`: phase of head and tail ahead of the body. A duty is the part of the cycle at vacuum."""
+    """A gait. `psi12_deg`, `psi13_deg`: phases of head and tail ahead of the body. A duty is the fraction of the cycle
+    at vacuum."""
 
     period_s: float
     psi12_deg: float
@@ -52,7 +53,7 @@ GAIT_NAMES = tuple(item.name for item in fields(Gait))
 
 
 def gait_rows(gaits: Sequence[Gait]) -> np.ndarray:
-    """(n, 6) in the order of a gait's fields."""
+    """Stack gaits as rows, shape (n, 6), in the order of a gait's fields."""
     return np.array([list(gait.as_dict().values()) for gait in gaits], dtype=float).reshape(-1, len(GAIT_NAMES))
 
 
@@ -61,7 +62,7 @@ BASELINE = Gait(5.7, 270.0, 90.0, 0.5, 0.5, 0.5)
 
 
 def save_gait(path: str | Path, gait: Gait, provenance: dict[str, Any] | None = None) -> None:
-    """Write a gait file; `provenance` is kept in a table of its own for the reader."""
+    """Write a gait file. `provenance` goes into a separate table for information; it is ignored when read."""
     document: dict[str, Any] = {"format": FORMAT, **gait.as_dict()}
     if provenance:
         document["provenance"] = provenance
@@ -70,19 +71,20 @@ def save_gait(path: str | Path, gait: Gait, provenance: dict[str, Any] | None = 
 
 @dataclass(frozen=True)
 class GaitFile:
-    """What a gait file holds: the gait, and other parameters of the Uno that go with it (`coupling_per_s` ...)."""
+    """Content of a gait file: the gait, and other parameters of the Uno that belong to it (`coupling_per_s` ...)."""
 
     gait: Gait
     others: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Everything that an upload sends, by name."""
+        """All parameters that an upload sends, by name."""
         return {**self.gait.as_dict(), **self.others}
 
 
 def read_gait_file(path: str | Path) -> GaitFile:
-    """Read a gait file strictly: GaitError names the file, and the key that is unknown, missing or out of range."""
+    """Read a gait file strictly. Raises GaitError, naming the file and the key that is unknown, missing or out of
+    range."""
     try:
         document = parse_toml(read_text(path))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -102,5 +104,5 @@ def read_gait_file(path: str | Path) -> GaitFile:
 
 
 def load_gait(path: str | Path) -> Gait:
-    """The gait of a file, for where nothing else in it matters; GaitError as `read_gait_file`."""
+    """Read only the gait from a gait file. Raises GaitError like `read_gait_file`."""
     return read_gait_file(path).gait

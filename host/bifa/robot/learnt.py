@@ -1,4 +1,4 @@
-"""Curves learnt from data and added to a term of the model: what is found but no effect of the library explains."""
+"""Curves learnt from data and added to terms of the model, for discrepancies that no effect in the library explains."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from bifa.robot.parameters import ModelParameterError
 
-# The terms that may have one, and by how many rows: two where it differs by direction (docs/diagnosis.md).
+# The terms that may have a learnt curve, and its number of rows: two if it depends on direction (docs/diagnosis.md).
 ROWS = {
     "body_spring": 1,
     "small_spring": 1,
@@ -25,8 +25,8 @@ ROWS = {
 
 @dataclass(frozen=True)
 class LearntCurve:
-    """`values`, shape (rows, n): what is added to the term, in its unit, at equal intervals from `lower` to `upper` of
-    the quantity that it is a function of; level beyond. With two rows the first is for a rising quantity, or forward.
+    """A learnt curve. `values`, shape (rows, n): added to the term, in its unit, at equal intervals of the independent
+    quantity from `lower` to `upper`; constant beyond. Of two rows, the first is for a rising quantity or for forward.
     """
 
     lower: float
@@ -38,21 +38,21 @@ class LearntCurve:
             values = np.array(self.values, dtype=float)
             inside = float(self.lower) < float(self.upper)
         except (TypeError, ValueError):
-            raise ModelParameterError("a learnt curve has lower, upper and rows of as many values each") from None
+            raise ModelParameterError("a learnt curve needs numbers lower, upper and rows of equal length") from None
         if not inside or values.ndim != 2 or values.shape[1] < 2 or not np.all(np.isfinite(values)):
-            raise ModelParameterError("a learnt curve needs lower below upper, and rows of two finite values or more")
+            raise ModelParameterError("a learnt curve needs lower < upper, and rows of at least two finite values")
         object.__setattr__(self, "values", values)
 
     def at(self, where: ArrayLike, row: int = 0) -> np.ndarray:
-        """What is added at `where`, a number or an array, by one of the rows."""
+        """Value of a row of the curve at `where`, a number or an array."""
         return np.interp(
             np.asarray(where, dtype=float), np.linspace(self.lower, self.upper, self.values.shape[1]), self.values[row]
         )
 
 
 def check(name: str, curve: LearntCurve) -> None:
-    """Raise ModelParameterError where there is no such term or the curve is not of its shape."""
+    """Raise ModelParameterError if there is no term `name` or the curve has the wrong number of rows."""
     if name not in ROWS:
-        raise ModelParameterError(f"no curve can be learnt at {name!r}; known are {', '.join(ROWS)}")
+        raise ModelParameterError(f"no curve can be learnt at {name!r}; possible terms are {', '.join(ROWS)}")
     if len(curve.values) != ROWS[name]:
         raise ModelParameterError(f"the learnt curve {name} has {len(curve.values)} rows instead of {ROWS[name]}")

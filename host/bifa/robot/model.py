@@ -21,7 +21,7 @@ STIFFNESS, LEARNT = ("body_stiffness", "small_stiffness"), "learnt"
 
 @dataclass(frozen=True)
 class Covariance:
-    """Covariance of some of the model's values: `matrix[i, j]` belongs to `names[i]`, `names[j]`."""
+    """Covariance of some of the model's values: `matrix[i, j]` is that of `names[i]` and `names[j]`."""
 
     names: tuple[str, ...]
     matrix: np.ndarray = field(repr=False)
@@ -38,13 +38,15 @@ class Covariance:
 
 @dataclass(frozen=True)
 class Scatter:
-    """What walks differ from the model by beyond the covariance of its values.
+    """Deviations of walks from the model beyond the covariance of its values.
 
-    friction: relative standard deviation of the friction from run to run. pressure_psi, force_N: RMS of what the model
-    leaves unexplained of pressures and forces, the same in every repeat; speed: of a walk's speed, relative. And how
-    the Uno keeps time, which is no scatter but moves the edge all the same: clock, seconds that pass in one of its own;
-    dead_time_s, of its own, in which a chamber is vented between the supplies; switch_error_s, by which valves switch
-    early or late at most, as its ticks fall.
+    friction: relative standard deviation of the friction from run to run. pressure_psi, force_N: RMS of the systematic
+    part of pressures and forces, the same in every repeat, that the model leaves unexplained; speed: the same for
+    a walk's speed, relative.
+
+    The Uno's timekeeping is not scatter, but affects at which gaits a robot stops walking. clock: true seconds per
+    second of the Uno; dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies;
+    switch_error_s: greatest error of a valve's switching time, due to the Uno's ticks.
     """
 
     friction: float = 0.0
@@ -57,15 +59,15 @@ class Scatter:
 
     @property
     def timing(self) -> Scatter:
-        """How the Uno keeps time, and nothing else."""
+        """A copy with only the Uno's timekeeping."""
         return Scatter(clock=self.clock, dead_time_s=self.dead_time_s, switch_error_s=self.switch_error_s)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not (math.isfinite(value) and value >= 0.0):
-                raise ModelParameterError(f"scatter.{name} = {value:g} must be a number not below 0")
+                raise ModelParameterError(f"scatter.{name} = {value:g} must be a finite number, at least 0")
         if not 0.9 <= self.clock <= 1.1:
-            raise ModelParameterError(f"scatter.clock = {self.clock:g} must be a clock's, within 0.9 to 1.1")
+            raise ModelParameterError(f"scatter.clock = {self.clock:g} must be within 0.9 to 1.1")
         for name in ("dead_time_s", "switch_error_s"):
             if getattr(self, name) > MOST_LATE_S:
                 raise ModelParameterError(f"scatter.{name} = {getattr(self, name):g} must be at most {MOST_LATE_S}")
@@ -73,10 +75,11 @@ class Scatter:
 
 @dataclass(frozen=True)
 class Model:
-    """A robot. Immutable: `with_values` and `with_effects` give changed copies, checked against the bounds.
+    """A model of the robot. Immutable: `with_values` and `with_effects` return changed copies, checked against the
+    bounds.
 
-    `effects` maps an active effect's name to its parameters, e.g. {"hysteresis": {"force_N": 4.0, ...}}; `learnt` the
-    name of a term to the curve learnt there.
+    `effects` maps the name of each active effect to its parameters, e.g. {"hysteresis": {"force_N": 4.0, ...}};
+    `learnt` maps the name of a term to the curve learnt there.
     """
 
     name: str
@@ -105,8 +108,8 @@ class Model:
                 self[name]
 
     def __getitem__(self, name: str) -> float:
-        """A value by its name: `mu_k`, or `hysteresis.force_N` for an active effect's; of the curves, as a covariance
-        names them, `body_stiffness.3`, a coefficient, and `learnt.filling.0.64`, a value by row and place."""
+        """A value by name: `mu_k`, or `hysteresis.force_N` for an active effect. Values of curves have the names used
+        in a covariance: `body_stiffness.3` (a coefficient), `learnt.filling.0.64` (row and position)."""
         if name in self.parameters:
             return self.parameters[name].value
         owner, *rest = name.split(".")
@@ -127,12 +130,12 @@ class Model:
 
     @property
     def values(self) -> dict[str, float]:
-        """Every value by name, those of active effects as `effect.parameter`."""
+        """All values by name; those of active effects as `effect.parameter`."""
         base = {name: parameter.value for name, parameter in self.parameters.items()}
         return base | {f"{e}.{p}": value for e, values in self.effects.items() for p, value in values.items()}
 
     def with_values(self, values: Mapping[str, float]) -> Model:
-        """A copy with some values changed; naming an effect's parameter makes the effect active."""
+        """A copy with some values changed. Setting an effect's parameter makes the effect active."""
         parameters = dict(self.parameters)
         effects = {name: dict(v) for name, v in self.effects.items()}
         for name, value in values.items():
@@ -146,6 +149,7 @@ class Model:
         return replace(self, parameters=parameters, effects=effects)
 
     def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Model:
-        """A copy with exactly these effects active; parameters left out take their typical values."""
+        """A copy with exactly these effects active. Omitted parameters take their default values; the covariance is
+        dropped if the set of effects changes."""
         kept = self.covariance
         return replace(self, effects=effects, covariance=kept if effects.keys() == self.effects.keys() else None)

@@ -25,11 +25,11 @@ FORMAT = 1
 
 
 class ModelFileError(BifaError):
-    """A model file is not usable; the text gives file, name and range."""
+    """A model file is invalid; the text gives file, name and range."""
 
 
 def nominal() -> Model:
-    """The set that reproduces the paper's figures, shipped with the package."""
+    """The parameter set shipped with the package, which reproduces the paper's figures."""
     springs = tomllib.loads(resources.files("bifa.robot").joinpath("nominal.toml").read_text("utf-8"))
     body, small = (_read_curve(name, springs[name]) for name in ("body", "small"))
     provenance = "Found by search: reproduces the figures that the paper reports (docs/model.md)."
@@ -37,7 +37,7 @@ def nominal() -> Model:
 
 
 def strong_push() -> Model:
-    """A set that reproduces the same and also the paper's push of 150 N, with a larger body area."""
+    """A parameter set with a larger body area that also reproduces the paper's push of 150 N."""
     model = nominal().with_values({"body_area_N_psi": 12.98, "body_alpha_n_per_s": 1.6, "body_alpha_s_per_s": 0.447})
     return replace(
         model,
@@ -49,7 +49,7 @@ def strong_push() -> Model:
 
 
 def load_model(path: str | Path) -> Model:
-    """Read a model file. ModelFileError for another format, unknown or missing names, values out of range."""
+    """Read a model file. Raises ModelFileError for another format, unknown or missing names, or values out of range."""
     try:
         text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
@@ -67,7 +67,7 @@ def load_model(path: str | Path) -> Model:
 
 
 def save_model(path: str | Path, model: Model) -> None:
-    """Write a model file that `load_model` reads back to the same numbers."""
+    """Write a model file, from which `load_model` restores the same numbers."""
     document: dict[str, Any] = {"format": FORMAT, "name": model.name}
     if model.provenance:
         document["provenance"] = model.provenance
@@ -117,7 +117,7 @@ def _build(document: dict[str, Any]) -> Model:
 
 
 def _tables(document: dict[str, Any], key: str) -> dict[str, dict[str, Any]]:
-    """The tables within an optional table."""
+    """The sub-tables of an optional table."""
     tables = document.get(key, {})
     if not isinstance(tables, dict) or not all(isinstance(values, dict) for values in tables.values()):
         raise ModelFileError(f"{key} must hold tables, such as [{key}.NAME]")
@@ -132,7 +132,7 @@ def _read_covariance(entry: dict[str, Any]) -> Covariance:
     try:
         return Covariance(tuple(names), np.array(matrix, dtype=float))
     except (TypeError, ValueError, OverflowError):
-        raise ModelFileError("covariance.matrix must be rows of numbers, as many as names") from None
+        raise ModelFileError("covariance.matrix must be a square matrix of numbers, with one row per name") from None
 
 
 def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
@@ -142,7 +142,7 @@ def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
         raise ModelFileError(f"parameters.{name} is in {base.unit!r}, not {entry['unit']!r}")
     sd = entry.get("sd")
     if sd is not None and not (isinstance(sd, (int, float)) and 0 <= sd < math.inf):
-        raise ModelFileError(f"parameters.{name}.sd must be a number not below 0")
+        raise ModelFileError(f"parameters.{name}.sd must be a number, at least 0")
     return base.with_value(entry["value"], sd=sd, source=str(entry.get("source", base.source)))
 
 
@@ -150,7 +150,7 @@ def _read_scatter(entry: dict[str, Any]) -> Scatter:
     _only(entry, "scatter", set(), {field.name for field in fields(Scatter)})
     for name, value in entry.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ModelFileError(f"scatter.{name} must be a number not below 0")
+            raise ModelFileError(f"scatter.{name} must be a number, at least 0")
     return Scatter(**{name: float(value) for name, value in entry.items()})
 
 
@@ -161,7 +161,7 @@ def _read_curve(name: str, entry: dict[str, Any]) -> StiffnessCurve:
         curve = StiffnessCurve(coefficients, float(entry["lower_m"]), float(entry["upper_m"]))
     except (TypeError, ValueError):
         raise ModelFileError(f"stiffness.{name} must hold numbers") from None
-    curve.equilibria_m  # noqa: B018 - a curve that is not bistable is refused here, with its reason
+    curve.equilibria_m  # noqa: B018 - raises if the curve is not bistable
     return curve
 
 

@@ -1,9 +1,9 @@
 """The model's named values: unit, bounds and source of each (paper, sections III and IV).
 
-The paper prints no table of identified parameters. Where the source says "found to reproduce", the value was
-searched so that everything the paper does report in numbers comes out (docs/model.md, `bifa simulate --paper`).
-Its symbols, and the equations that they are in: m_h, m_t (4), m_h of a pull (7); m, b, b_b (1); a (2); alpha_n,
-alpha_s (3); x_w, k_w, b_w (8); mu_s, mu_k (5).
+The paper has no table of identified parameters. A value whose source says "found to reproduce" comes from a search for
+values that reproduce every figure that the paper reports (docs/model.md, `bifa simulate --paper`).
+The paper's symbols, with their equations: m_h, m_t (4), m_h of a pull (7); m, b, b_b (1); a (2); alpha_n, alpha_s (3);
+x_w, k_w, b_w (8); mu_s, mu_k (5).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ class ModelParameterError(BifaError):
 class ModelParameter:
     """One value of the model in SI units (pressures in psi, as everywhere in the paper).
 
-    `lower` and `upper` bound what can be computed and fitted, `plausible` what a sane robot would show,
-    `sd` is the standard deviation from a fit (None: not fitted).
+    `lower` and `upper` bound the values that can be simulated and fitted; `plausible` is the range expected of an
+    intact robot; `sd` is the standard deviation from a fit (None: not fitted).
     """
 
     name: str
@@ -36,7 +36,7 @@ class ModelParameter:
     sd: float | None = None
 
     def with_value(self, value: float, sd: float | None = None, source: str | None = None) -> ModelParameter:
-        """The same parameter with another value; ModelParameterError when it is outside the bounds."""
+        """A copy with another value. Raises ModelParameterError if it is outside the bounds."""
         self.check(value)
         return replace(self, value=float(value), sd=sd, source=self.source if source is None else source)
 

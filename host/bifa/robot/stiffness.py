@@ -1,10 +1,10 @@
-"""K(x) of the bistable spring: a 15th-degree polynomial, and what holds outside the range it was fitted on.
+"""K(x) of the bistable spring: a 15th-degree polynomial with linear extrapolation outside its fitted range.
 
-In metres such a polynomial has a Vandermonde condition of 3e24, in the normalised coordinate
-z = 2 (x - lower)/(upper - lower) - 1 of 2e5: so the coefficients are those of z.
-The robot leaves the range of a static test (-5.3 mm under vacuum, 57.9 mm at 8.5 psi, against stable states at
-0.2 and 53.6 mm), where a polynomial is worth nothing: beyond `lower` and `upper` the curve goes on straight, with
-the slope that it has there.
+In metres, the Vandermonde matrix of such a polynomial has a condition number of 3e24; in the normalised coordinate
+z = 2 (x - lower)/(upper - lower) - 1, it is 2e5. The coefficients are therefore those of powers of z.
+The robot leaves the range of a static test (-5.3 mm under vacuum, 57.9 mm at 8.5 psi, with stable states at 0.2 and
+53.6 mm), where the polynomial is meaningless: beyond `lower` and `upper`, the curve continues straight with the slope
+at that end.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _NEWTON_STEPS = 8
 
 @dataclass(frozen=True)
 class StiffnessCurve:
-    """K(x) in N over x in m; `coefficients` ascend in powers of z, at most 16 of them."""
+    """K(x) in N over x in m. `coefficients`: at most 16, of ascending powers of z."""
 
     coefficients: tuple[float, ...]
     lower_m: float
@@ -41,7 +41,7 @@ class StiffnessCurve:
             )
 
     def force(self, x_m: ArrayLike) -> np.ndarray:
-        """K(x) in N, elementwise, with the straight continuation."""
+        """K(x) in N, elementwise, including the straight continuation."""
         x = np.asarray(x_m, dtype=float)
         inside = np.clip(x, self.lower_m, self.upper_m)
         return self._polynomial(self._z(inside)) + self.slope(inside) * (x - inside)
@@ -55,13 +55,14 @@ class StiffnessCurve:
     def equilibria_m(self) -> tuple[float, float, float]:
         """Contracted stable, unstable (x_th of eq. (3)) and extended stable point.
 
-        The outer zeros of K that rise, and the falling one between them. ModelParameterError if K is not bistable.
+        These are the outermost rising zeros of K and the falling zero between them. Raises ModelParameterError if K is
+        not bistable.
         """
         x = np.linspace(self.lower_m, self.upper_m, _SCAN_POINTS)
         force = self.force(x)
         crossings = np.flatnonzero((force[:-1] < 0) != (force[1:] < 0))
         roots = x[crossings]
-        for _ in range(_NEWTON_STEPS):  # SciPy's root finders would double the time that a command takes to start
+        for _ in range(_NEWTON_STEPS):  # importing SciPy's root finders would double a command's start-up time
             slope = self.slope(roots)
             step = self.force(roots) / np.where(slope == 0.0, np.inf, slope)
             roots = np.clip(roots - step, x[crossings], x[crossings + 1])
@@ -91,7 +92,7 @@ class StiffnessCurve:
 
     @property
     def peaks(self) -> tuple[float, float]:
-        """Greatest resistance in N while extending (positive) and contracting (negative)."""
+        """Greatest resistance in N while extending (positive) and while contracting (negative)."""
         force = self.force(np.linspace(self.contracted_m, self.extended_m, _SCAN_POINTS))
         return float(force.max()), float(force.min())
 

@@ -1,4 +1,4 @@
-"""The simulator: every experiment of the paper, with any set of effects, fast enough to fit and to optimise.
+"""The simulator: every experiment of the paper, with any set of effects, fast enough for fitting and optimisation.
 
 >>> from bifa import robot, simulate
 >>> record = simulate.walk(robot.nominal(), robot.BASELINE, cycles=10)

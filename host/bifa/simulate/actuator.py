@@ -1,7 +1,7 @@
 """One actuator over one step: eq. (1)-(3), linearly implicit in the velocity, exact in the pressure.
 
-The state of the pressure is p = F / a, in psi, so that an area that varies stays apart from the air.
-`actuator` is 0 body, 1 head, 2 tail (the place in the effects' memory `z`); `block` is layout.BODY or SMALL.
+The pressure state is p = F / a, in psi, which keeps a varying area separate from the air.
+`actuator` is 0 body, 1 head, 2 tail (the offset in the effects' states `z`); `block` is layout.BODY or SMALL.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from bifa.simulate.learnt import AREA, DAMPING, EMPTYING, FILLING, IN_AREA, IN_D
 
 @merged
 def reach(curve):
-    """Lower and upper end of a table, and 1 / width of its intervals."""
+    """Lower and upper end of a stiffness table, and 1 / width of its intervals."""
     return curve[0, 0], curve[0, 1], curve[0, 2]
 
 
 @merged
 def cubic(curve, row):
-    """A row of a table."""
+    """The four coefficients in a row of a stiffness table."""
     return curve[row, 0], curve[row, 1], curve[row, 2], curve[row, 3]
 
 
 @merged
 def stiffness(curve, x):
-    """K(x) and its slope, straight outside the table."""
+    """K(x) and its slope, with linear extrapolation outside the table."""
     lower, upper, per_width = reach(curve)
     place = (min(max(x, lower), upper) - lower) * per_width
     i = min(int(place), curve.shape[0] - 2)
@@ -45,13 +45,13 @@ def stiffness(curve, x):
 
 @merged
 def convergence(q, block, x, inlet):
-    """alpha of eq. (3)."""
+    """The convergence factor alpha of eq. (3)."""
     return q[block + layout.ALPHA_S] if x > q[block + layout.THRESHOLD] and inlet < 0.0 else q[block + layout.ALPHA_N]
 
 
 @merged
 def pressure_after(plant, rig, block, actuator, z, z_new, x, pressure, source, h):
-    """Eq. (2) over a step: exact for the inlet and the convergence factor as they are at its ends."""
+    """The pressure after a step by eq. (2), exact for a constant inlet pressure and convergence factor."""
     q, active = plant.q, plant.active
     inlet = chains.line(active, q, z, actuator, z_new, source, h)
     rate = chains.filling(active, q, convergence(q, block, x, inlet), pressure, inlet, rig.share[actuator])
@@ -65,7 +65,7 @@ def pressure_after(plant, rig, block, actuator, z, z_new, x, pressure, source, h
 
 @merged
 def area_at(plant, block, x):
-    """a of eq. (2), in N/psi."""
+    """The area a of eq. (2), in N/psi."""
     q = plant.q
     share = (x - q[block + layout.CONTRACTED]) / q[block + layout.STROKE]
     factor = chains.area(plant.active, q, share)
@@ -76,7 +76,7 @@ def area_at(plant, block, x):
 
 @merged
 def pressure_moved(plant, block, before, after, pressure):
-    """The pressure once the stroke is another: what an area that varies makes of it."""
+    """The pressure after the stroke has changed from `before` to `after`, if the area varies along it."""
     if not plant.active & chains.AIR:
         return pressure
     ratio = area_at(plant, block, before) / area_at(plant, block, after)
@@ -85,7 +85,7 @@ def pressure_moved(plant, block, before, after, pressure):
 
 @merged
 def resistance(plant, curve, block, actuator, z, x, v, h):
-    """Spring and damper at the end of a step as `force + growth * velocity`; the velocity is that of the end."""
+    """Linearise spring and damper over a step: `force + growth * velocity`, with the velocity at the step's end."""
     q, active = plant.q, plant.active
     if active & chains.PLAY:
         here = chains.play(active, q, z, actuator, x)
@@ -109,7 +109,7 @@ def resistance(plant, curve, block, actuator, z, x, v, h):
 
 @merged
 def remember(plant, actuator, z, z_new, x_new, travel, h):
-    """The effects' memory of the spring after a step."""
+    """Update the effects' states of the spring after a step."""
     q, active = plant.q, plant.active
     if active & chains.SPRING_STATE:
         chains.spring_state(active, q, z, actuator, z_new, travel, h)
@@ -119,7 +119,7 @@ def remember(plant, actuator, z, z_new, x_new, travel, h):
 
 @merged
 def read_pressure(plant, block, pressure, x, v, source):
-    """Pressure where the sensor sits; inside, p = (F - b v) / a (section III.A), a that of the stroke."""
+    """Pressure at the sensor. Inside the chamber it is p = (F - b v) / a (section III.A), with a at this stroke."""
     q, active = plant.q, plant.active
     inside = pressure - q[block + layout.DAMPING] * v / area_at(plant, block, x)
     return chains.sensed(active, q, inside, source)

@@ -1,7 +1,7 @@
-"""The compiled functions that Python calls, with an on-disk cache that notices a change of any source.
+"""The compiled functions that Python calls, with an on-disk cache that is invalidated by a change in any source.
 
-The one file with a cache is generated: three lines a function, and in its name the hash of all compiled sources of the
-simulator and of the effects.
+The only file with a numba cache is generated. It holds a wrapper for each function, and its name contains the hash of
+all compiled sources of the simulator and the effects.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from bifa import effects
 from bifa.simulate import generated, hooks, locomotion, stand
 
 _ENTRIES = (locomotion.walk_record, stand.step_record, stand.static_record, stand.anchor_record)
-# Never compiled: a change there needs no new compilation.
+# Modules without compiled code: a change there needs no recompilation.
 _PLAIN = {"__init__", "entries", "gaits", "paper", "passing", "records", "rigs", "tables", "terrain"}
 
 
 def sources() -> list[str]:
-    """Of the simulator, of every effect wherever its file lies, and of the chains that join them."""
+    """Source texts of the simulator, of every effect (wherever its file is) and of the chains of hooks."""
     paths = [path for path in sorted(Path(__file__).parent.glob("*.py")) if path.stem not in _PLAIN]
     own = [path.read_text("utf-8") for path in paths]
     return [*own, *(inspect.getsource(module) for module in effects.modules().values()), hooks.chain_source()]

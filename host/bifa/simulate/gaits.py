@@ -1,4 +1,4 @@
-"""How far gaits carry the robot: the fast metric for the optimiser, on both cores."""
+"""Advance and slip per cycle for many gaits: the fast metric of the gait search, computed on all cores."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from bifa.simulate.timeline import gait_switches
 
 FAST_TOLERANCE_M = 1e-5
 _PIECES_PER_WORKER = 8
-_LANES_FULL = 4  # times over, for a piece: lanes stand idle at its end
+_LANES_FULL = 4  # walks per lane in a piece: at its end, lanes are idle
 
 
 @dataclass(frozen=True)
 class Advance:
-    """Head's advance and slip of each cycle, in m; shapes (..., cycles). Slip: travel while both ends slide."""
+    """Advance of the head and slip in each cycle, in m, shape (..., cycles). Slip is travel while both ends slide."""
 
     advance_m: np.ndarray
     slip_m: np.ndarray
@@ -37,7 +37,8 @@ class Advance:
 
 
 def speed(model: Model | Plant, gait: Gait, cycles: int = 10, tolerance_m: float = FAST_TOLERANCE_M) -> Advance:
-    """One gait from rest; shapes (cycles,). Use tolerance 1e-6 or less to verify what a search has found."""
+    """Simulate one gait from rest; arrays have shape (cycles,). Use a tolerance of 1e-6 or less to verify the result of
+    a search."""
     result = speeds(model, gait_rows([gait]), cycles, tolerance_m, workers=1)
     return Advance(result.advance_m[0], result.slip_m[0], result.period_s[0])
 
@@ -54,11 +55,11 @@ def speeds(
     workers: int | None = None,
     executor: Executor | None = None,
 ) -> Advance:
-    """Many gaits (n, 6) with one model, or with n models one each; shapes (n, cycles). `dead_time_s`: for so long the
-    Uno vents a chamber between its supplies.
+    """Simulate gaits (n, 6), all with one model or each with its own of n models; arrays have shape (n, cycles).
+    `dead_time_s`: how long the Uno vents a chamber when switching between supplies.
 
-    Runs on `executor`, else in threads, without the GIL: `workers`, or one a core. Rows are dealt out in small pieces,
-    since gaits differ in cost. Angles need not be within 0-360.
+    Runs on `executor`, or else in `workers` threads (by default one per core) without the GIL. Rows are distributed in
+    small pieces, since gaits differ in cost. Angles need not be within 0-360.
     """
     gaits = np.ascontiguousarray(gaits, dtype=float).reshape(-1, 6)
     n = gaits.shape[0]
@@ -86,7 +87,7 @@ def _progress(
     flats: Sequence[Plant],
     gaits: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Advance and slip of each cycle, (n, cycles) each."""
+    """Advance and slip in each cycle, each of shape (n, cycles)."""
     ways = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
     ends = gaits[:, :1] * np.arange(1, cycles + 1)
     switches = gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)
@@ -97,12 +98,12 @@ def _progress(
 
 
 def _full_lanes() -> int:
-    """Walks that are worth a call: fewer leave lanes idle at its end for much of the time."""
+    """Smallest number of walks worth a call: with fewer, lanes are idle for much of it."""
     return _LANES_FULL * lanes.width() if lanes.width() > 1 else 1
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

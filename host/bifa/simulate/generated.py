@@ -1,7 +1,7 @@
-"""Python source that is written by the program, kept in the user's cache under a name that is a hash of its text.
+"""Generated Python source, kept in the user's cache under a name that contains the hash of its text.
 
-numba caches compiled code by file, but does not notice when a function in another file, called from there, has
-changed. So everything with an on-disk cache lives in files whose very name changes with any of its sources.
+numba caches compiled code by file, but does not notice a change in a function of another file that is called from
+there. Everything with an on-disk cache is therefore in files whose names change with any of their sources.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ _KEEP_S = 30 * 86400.0
 
 
 def digest(*texts: str) -> str:
-    """Short hash of texts and of the compiler's version."""
+    """Short hash of the texts and the versions of numba and Python."""
     whole = "\0".join((numba.__version__, sys.version, *texts))
     return hashlib.sha256(whole.encode()).hexdigest()[:16]
 
 
 def folder() -> Path:
-    """Where generated code lives: BIFA_CACHE_DIR, else the user's cache, else a temporary one, the user's alone."""
+    """Folder of generated code: BIFA_CACHE_DIR, else in the user's cache, else a private temporary folder."""
     named = os.environ.get("BIFA_CACHE_DIR")
     chosen = Path(named) if named is not None else _users_cache() / "bifa"
     with contextlib.suppress(OSError):
@@ -40,7 +40,7 @@ def folder() -> Path:
     try:
         return temporary_folder()
     except OSError as error:
-        raise OSError("no folder can be written for compiled code; set BIFA_CACHE_DIR") from error
+        raise OSError("no writable folder for compiled code: set BIFA_CACHE_DIR to one") from error
 
 
 def _users_cache() -> Path:
@@ -49,7 +49,8 @@ def _users_cache() -> Path:
 
 @functools.cache
 def temporary_folder() -> Path:
-    """One for every process if only this user can write there, since its code is executed; else this process's own."""
+    """A folder shared by the user's processes if only this user can write to it, since its code is executed; otherwise
+    one for this process alone."""
     candidate = Path(tempfile.gettempdir()) / f"bifa-{os.getuid() if hasattr(os, 'getuid') else 0}"
     with contextlib.suppress(OSError):
         candidate.mkdir(mode=0o700, exist_ok=True)
@@ -60,13 +61,13 @@ def temporary_folder() -> Path:
 
 def _is_ours_alone(there: Path) -> bool:
     if not hasattr(os, "getuid"):
-        return there.is_dir()  # Windows' temporary folder is the user's own
-    found = there.lstat()  # a link may be led elsewhere later
+        return there.is_dir()  # on Windows, the temporary folder belongs to the user
+    found = there.lstat()  # not stat: a symbolic link could be redirected later
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
 def load(stem: str, source: str) -> ModuleType:
-    """Import `source` from its file, written first if it is new. The name tells the hash apart."""
+    """Import `source` as a module, writing its file first if it does not exist. `stem` and a hash form its name."""
     name = f"bifa_{stem}_{digest(source)}"
     if name in sys.modules:
         return sys.modules[name]
@@ -76,7 +77,7 @@ def load(stem: str, source: str) -> ModuleType:
         forget_old(path.parent)
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise ImportError(f"{path} is no module")
+        raise ImportError(f"{path} is not a Python module")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
@@ -95,7 +96,7 @@ def _write(path: Path, source: str) -> None:
 
 
 def forget_old(cache: Path) -> None:
-    """Remove what has not been read for a month."""
+    """Remove generated files that have not been read for a month."""
     limit = time.time() - _KEEP_S
     for old in (*cache.glob("bifa_*.py"), *cache.glob("bifa_*.so"), *cache.glob("__pycache__/bifa_*")):
         with contextlib.suppress(OSError):

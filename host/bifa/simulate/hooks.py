@@ -1,10 +1,10 @@
-"""Where an effect may act: the hooks, and the chains of all effects' functions that the integrator calls.
+"""The hooks at which effects act, and the chains of effects' functions that the integrator calls.
 
-An effect's file defines functions named after hooks. Their arguments are found by name: the effect's own
-parameters, what the hook offers, and `state`, the number remembered for each actuator. Each chain calls
-the active effects in alphabetical order; an effect costs one test of a bit while it is inactive.
+An effect's file defines functions named after hooks. Their arguments are matched by name: the effect's own parameters,
+the arguments that the hook offers, and `state`, the effect's state variable of each actuator. Each chain calls the
+active effects in alphabetical order; an inactive effect costs one bit test.
 
-What each hook returns, and in which unit, is in docs/adding-an-effect.md.
+docs/adding-an-effect.md lists what each hook returns, with units.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from bifa.effects import EffectError, PhysicalEffect
 from bifa.simulate import generated, layout
 
 _STATEFUL = ("z", "actuator")
-# hook: (arguments of the chain, offered to effects unless hidden; how the effects' results combine)
+# hook: (arguments of the chain, which are offered to effects unless hidden; how the effects' results are combined)
 HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "delay": (("to_positive",), "sum"),
     "supply": (("supply_psi", "now_s"), "replace"),
@@ -42,8 +42,8 @@ HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "initial": ((*_STATEFUL, "position_m", "pressure_psi"), "first"),
 }
 HIDDEN = {"z", "z_new", "actuator"}
-# How results combine: what the chain begins with, what each call does, and what the chain returns. `{value}` is the
-# hook's first argument that is offered, `{state}` the place of the effect's own number.
+# How results are combined: the chain's initial statement, the statement of each call, and the value that the chain
+# returns. `{value}` is the hook's first offered argument, `{state}` the index of the effect's state.
 _COMBINED = {
     "sum": ("total = 0.0", "total += {call}", "total"),
     "product": ("total = 1.0", "total *= {call}", "total"),
@@ -52,13 +52,13 @@ _COMBINED = {
     "keep": ("", "{value} = {call}; z_new{state} = {value}", "{value}"),
     "state": ("", "z_new{state} = {call}", ""),
     "first": ("", "z{state} = {call}", ""),
-    # The next sensor of the chain sees this one's output.
+    # The next sensor in the chain receives this one's output.
     "follow": ("", "before = z{state}; after_psi = {call}; z{state} = after_psi; before_psi = before", "after_psi"),
 }
 
 
 def chain_source() -> str:
-    """Python source of one chain a hook over all effects of the library."""
+    """Python source of the chains, one per hook, over all effects of the library."""
     modules = effects.modules()
     lines = ['"""Generated from the library of effects; do not edit."""', "from numba import njit", ""]
     for name in modules:
@@ -72,7 +72,7 @@ def chain_source() -> str:
         lines.append(f"{hook.upper()} = {sum(1 << layout.effect_bit(name) for name in users[hook])}")
     idle = [name for name in modules if not any(name in names for names in users.values())]
     if idle:
-        raise EffectError(f"{', '.join(idle)} acts nowhere: no function is named after a hook ({', '.join(HOOKS)})")
+        raise EffectError(f"{', '.join(idle)} does not act: no function is named after a hook ({', '.join(HOOKS)})")
     for hook, names in users.items():
         lines += _chain(hook, names)
     return "\n".join(lines) + "\n"
@@ -86,7 +86,7 @@ def _chain(hook: str, names: list[str]) -> list[str]:
     for name in names:
         effect = effects.library()[name]
         if "{state}" in each and not effect.states:
-            raise EffectError(f"{name}.{hook} returns what is remembered: {name} must declare states=1")
+            raise EffectError(f"{name}.{hook} returns a state: {name} must declare states=1")
         state = f"[{layout.state_slot(name)} + actuator]" if effect.states else ""
         body.append(f"if active & {1 << layout.effect_bit(name)}:")
         body.append("    " + each.format(call=_call(hook, effect, state), value=value, state=state))
@@ -103,7 +103,7 @@ def _chain(hook: str, names: list[str]) -> list[str]:
 
 
 def _call(hook: str, effect: PhysicalEffect, state: str) -> str:
-    """The call of an effect's function; `state`: where in the memory the actuator's number is."""
+    """Source of the call of an effect's function; `state`: index of the actuator's state in `z`."""
     own = {parameter.name: f"q[{layout.index(f'{effect.name}.{parameter.name}')}]" for parameter in effect.parameters}
     offered = {argument: argument for argument in HOOKS[hook][0] if argument not in HIDDEN}
     if effect.states and "actuator" in HOOKS[hook][0]:
@@ -112,7 +112,9 @@ def _call(hook: str, effect: PhysicalEffect, state: str) -> str:
     for argument in inspect.signature(getattr(effects.modules()[effect.name], hook)).parameters:
         source = own.get(argument) or offered.get(argument)
         if source is None:
-            raise EffectError(f"{effect.name}.{hook} asks for {argument!r}; it may have {', '.join([*own, *offered])}")
+            raise EffectError(
+                f"{effect.name}.{hook} has an unknown argument {argument!r}; it may take {', '.join([*own, *offered])}"
+            )
         given.append(source)
     return f"{hook}_of_{effect.name}({', '.join(given)})"
 

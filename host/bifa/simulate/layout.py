@@ -1,4 +1,4 @@
-"""Where each number of a model sits in the flat vector `q` that the compiled code reads."""
+"""Positions of a model's parameters in the flat vector `q` that compiled code reads."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from functools import cache
 from bifa import effects
 from bifa.robot.parameters import BASE_PARAMETERS
 
-# A block of each actuator: BODY + DAMPING, SMALL + AREA ...
+# Each actuator has a block: BODY + DAMPING, SMALL + AREA ...
 MASS, DAMPING, AREA, ALPHA_N, ALPHA_S, THRESHOLD, CONTRACTED, STROKE, VOLUME = range(9)
 BODY, SMALL = 0, 9
-# The robot
+# Parameters of the whole robot
 (
     HEAD_MASS,
     TAIL_MASS,
@@ -59,7 +59,7 @@ def parameter_indices() -> dict[str, int]:
 
 
 def index(name: str) -> int:
-    """Place of a parameter (`mu_k`, `hysteresis.force_N`) in `q`."""
+    """Index of a parameter (`mu_k`, `hysteresis.force_N`) in `q`."""
     return parameter_indices()[name]
 
 
@@ -71,7 +71,7 @@ def size() -> int:
 
 @cache
 def effect_bit(name: str) -> int:
-    """The effect's bit in the mask of active effects."""
+    """Number of an effect's bit in the mask of active effects."""
     return list(effects.library()).index(name)
 
 
@@ -85,7 +85,7 @@ def effect_slots() -> dict[str, int]:
 
 
 def state_slot(effect: str) -> int:
-    """First of the effect's three remembered numbers (body, head, tail) in `z`."""
+    """Index of the first of an effect's three states (body, head, tail) in `z`."""
     return effect_slots()[effect]
 
 

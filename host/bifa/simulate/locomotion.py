@@ -1,4 +1,4 @@
-"""Walks: marching through a timeline of switches."""
+"""Simulation of walks, driven by a timeline of switches."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bifa.simulate.stepper import (
 )
 from bifa.simulate.timeline import delayed
 
-# Columns of a record: the state y, then what the sensors say, the normal forces (7), and how far both ends have slid.
+# Columns of a record: the state y, the sensor readings, the normal forces (7), and the travel while both ends slid.
 READ_BODY = STATES
 NORMAL_HEAD = STATES + 3
 SLIP = STATES + 5
@@ -28,7 +28,7 @@ COLUMNS = STATES + 6
 
 @merged
 def contracted(plant, rig, run):
-    """Put a new run where a walk starts: at rest, vented and contracted, the tail's end at 0."""
+    """Initialise a run at the start of a walk: at rest, vented and contracted, with the tail's end at 0."""
     run.y[X_HEAD] = plant.q[layout.BODY + layout.CONTRACTED]
     run.y[X_SMALL_HEAD] = run.y[X_SMALL_TAIL] = plant.q[layout.SMALL + layout.CONTRACTED]
     start_effects(plant, rig, run)
@@ -36,7 +36,7 @@ def contracted(plant, rig, run):
 
 @merged
 def walk_row(plant, rig, run, row):
-    """What a record of a walk says of this moment, into (COLUMNS,)."""
+    """Write the present row of a walk's record into `row` (COLUMNS,)."""
     for i in range(STATES):
         row[i] = run.y[i]
     for actuator in range(3):
@@ -48,8 +48,8 @@ def walk_row(plant, rig, run, row):
 
 @merged
 def seen_row(plant, rig, run, row):
-    """What instruments see of a walk: head's and tail's place in m, each with its velocity, and the three readings in
-    psi, into (7,)."""
+    """Write what instruments measure in a walk into `row` (7,): position in m and velocity in m/s of the head, the same
+    of the tail, and the three pressure readings in psi."""
     row[0], row[1], row[2], row[3] = run.y[X_HEAD], run.y[V_HEAD], run.y[X_TAIL], run.y[V_TAIL]
     for actuator in range(3):
         row[4 + actuator] = shown(plant, run, actuator)
@@ -57,13 +57,13 @@ def seen_row(plant, rig, run, row):
 
 @merged
 def progress_row(plant, rig, run, row):
-    """How far a walk has come: the head's place, and how far both ends have slid at once, in m, into (2,)."""
+    """Write a walk's progress into `row` (2,): position of the head and travel while both ends slid, in m."""
     row[0], row[1] = run.y[X_HEAD], run.slip[0]
 
 
 @kernel
 def walk_record(plant, rig, states_of_effects, times, chamber, command, sample_times, tolerance):
-    """(n, COLUMNS) at `sample_times` (rising, from 0), of a walk that starts at rest at time 0."""
+    """Simulate a walk from rest at time 0. Returns (n, COLUMNS) at `sample_times` (nondecreasing, none negative)."""
     run = new_run(states_of_effects)
     contracted(plant, rig, run)
     late, order = delayed(plant, times, chamber, command)

@@ -1,9 +1,8 @@
-"""Marching in time: steps as long as the error allows, ending exactly at switches and samples.
+"""Adaptive time stepping: steps as long as the error allows, ending exactly at switches and samples.
 
-A step of h is taken once whole and once as two halves. Their difference is the error's estimate, and 2
-(halves) - (whole) is of second order. Where the three are not of one kind (something started to slide,
-touched the wall or passed x_th in between) the halves stand as they are, and the tolerance makes the step
-short.
+Each step h is taken once whole and once as two halves. Their difference estimates the error, and 2 (halves) - (whole)
+is second-order accurate. If the three steps differ in kind (an end started to slide, touched the wall or passed x_th
+in between), the result of the halves is kept unextrapolated, and a tighter tolerance keeps the step short.
 """
 
 from __future__ import annotations
@@ -36,20 +35,22 @@ LONGEST_S = 0.1
 SHORTEST_S = 1e-5
 FIRST_S = 1e-3
 ARRIVED_S = 1e-12
-_HOPELESS_S = 1e-6  # where even shorter steps are asked for there is no solution: the run goes on as NaN
-# In a run until now, for a tolerance of 1 um: ten times what walking takes, and some to begin with. Beyond: NaN
+_HOPELESS_S = 1e-6  # if even shorter steps are needed, there is no solution: the run becomes NaN
+# Limit on a run's steps so far, at a tolerance of 1 um: an initial allowance plus ten times what walking takes. A run
+# that exceeds it becomes NaN.
 _MOST_STEPS, _MOST_STEPS_PER_S = 40_000.0, 20_000.0
-_ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the halves are of first order only
+_ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the result is first-order only
 _POSITION, _VELOCITY, _PRESSURE, _SMALL_POSITION, _SMALL_VELOCITY = 1.0, 300.0, 300.0, 2.0, 600.0
-# Over the tolerance of each state, that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
+# Tolerance of a position over that of each state. A velocity error of 1e-3 m/s shows as 0.015 psi in a reading.
 _SHARES = 1.0 / np.array(
     [_POSITION, _VELOCITY, _POSITION, _VELOCITY, _PRESSURE, *(2 * (_SMALL_POSITION, _SMALL_VELOCITY, _PRESSURE))]
 )
 
 
 class Run(NamedTuple):
-    """What a march works on. `y`, `z`: the state now; `clock`: time, proposed step, steps tried; `slip`: both ends'
-    travel while both slide, the lesser one summed; `command`: (3,) of the chambers; the rest is scratch."""
+    """Working state of an integration. `y`, `z`: the present state; `clock`: time, proposed step, steps tried; `slip`:
+    accumulated travel while both ends slide (the smaller of the two); `command`: (3,), one per chamber; the rest is
+    scratch."""
 
     y: np.ndarray
     z: np.ndarray
@@ -69,7 +70,7 @@ class Run(NamedTuple):
 
 @kernel
 def new_run(states_of_effects):
-    """At rest at time 0, everything 0, all valves off."""
+    """A run at time 0 with all states 0 and all valves off."""
     n = states_of_effects
     return Run(
         np.zeros(STATES),
@@ -91,7 +92,7 @@ def new_run(states_of_effects):
 
 @merged
 def start_effects(plant, rig, run):
-    """First memory of the effects, where positions and pressures are as in `run`."""
+    """Initialise the effects' states for the positions and pressures in `run`."""
     y = run.y
     gravity_of(plant, rig, run.gravity)
     if plant.active & chains.INITIAL:
@@ -104,7 +105,7 @@ def start_effects(plant, rig, run):
 
 @merged
 def pressures(plant, run):
-    """What the sensors' places see, into `run.read`."""
+    """Write the pressures at the sensors into `run.read`."""
     y, read, source = run.y, run.read, run.source
     stroke, opening = y[X_HEAD] - y[X_TAIL], y[V_HEAD] - y[V_TAIL]
     read[0] = read_pressure(plant, layout.BODY, y[P_BODY], stroke, opening, source[0])
@@ -115,7 +116,7 @@ def pressures(plant, run):
 
 @merged
 def shown(plant, run, actuator):
-    """What the sensor of an actuator says."""
+    """Reading of an actuator's pressure sensor."""
     value = run.read[actuator]
     if plant.active & chains.SENSOR:
         value = chains.sensor(plant.active, plant.q, run.z, actuator, value, value, 1e-9)
@@ -124,7 +125,7 @@ def shown(plant, run, actuator):
 
 @inner
 def march(plant, rig, run, until, tolerance):
-    """Advance `run` to `until`. `tolerance`: of a position in m, a step."""
+    """Advance `run` to `until`. `tolerance` bounds the estimated error of a position in one step, in m."""
     while until - run.clock[0] > ARRIVED_S and math.isfinite(run.y[0]):
         attempt(plant, rig, run, until, tolerance)
     run.clock[0] = until
@@ -133,7 +134,7 @@ def march(plant, rig, run, until, tolerance):
 
 @kernel
 def march_through(plant, rig, run, until, tolerance, late, order, chamber, command, i):
-    """March to `until`, switching valves on the way; returns the next switch."""
+    """March to `until`, switching valves on the way. Returns the index of the next switch."""
     while i < order.size and late[order[i]] <= until:
         k = order[i]
         march(plant, rig, run, late[k], tolerance)
@@ -145,14 +146,14 @@ def march_through(plant, rig, run, until, tolerance, late, order, chamber, comma
 
 @merged
 def arrive(plant, run):
-    """What is read where a march ends."""
+    """Update the pressure readings at the end of a march."""
     if not plant.active & chains.SENSOR and math.isfinite(run.y[0]):
         pressures(plant, run)
 
 
 @merged
 def attempt(plant, rig, run, until, tolerance):
-    """Try a step towards `until`; a run that has no solution becomes NaN."""
+    """Try one step towards `until`. A run without a solution becomes NaN."""
     clock = run.clock
     y, z = run.y, run.z
     whole, first, halves = run.whole, run.first, run.halves
@@ -211,7 +212,7 @@ def _accept(plant, run, smooth):
 
 @merged
 def _cut_short(before, first, h):
-    """Travel that is lost where an end already rests after the first half: whole and halves agree, and are wrong."""
+    """Travel that is lost if an end comes to rest within the first half: whole and halves then agree, but are wrong."""
     lost = 0.0
     if first[V_HEAD] == 0.0:
         lost = abs(before[V_HEAD])

@@ -1,4 +1,4 @@
-"""The paper's figures beside ours: everything that it reports in numbers and the model can say."""
+"""Comparison with every figure that the paper reports and the model can predict."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from bifa.simulate.passing import Passing, passing
 from bifa.simulate.records import anchor_pull, static_loading, step_response
 from bifa.simulate.terrain import OBSTACLES, Supports, tunnel
 
-# Near the nominal model's fastest gait (`bifa optimize` finds it), as that of the paper's Fig. 7 (b).
+# Close to the nominal model's fastest gait (as found by `bifa optimize`), the counterpart of the paper's Fig. 7 (b).
 FAST = Gait(2.515966106, 208.934381, 331.874322, 0.649065611, 0.442500311, 0.442500311)
-# The same of `robot.strong_push()`.
+# The same for `robot.strong_push()`.
 FAST_STRONG = Gait(2.52425, 179.4798, 354.26768, 0.64656, 0.46758, 0.46758)
 SLOW = Gait(6.0, 270.0, 90.0, 0.5, 0.5, 0.5)
 _PULL_S = np.arange(0.0, 2.0, 1e-3)
@@ -25,7 +25,7 @@ _FINE_M = 1e-7
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table. `fits`: our value is what the paper says, within its own precision."""
+    """One line of the table. `fits`: our value agrees with the paper's within the precision of the latter."""
 
     what: str
     paper: str
@@ -35,7 +35,7 @@ class Row:
 
 
 def compare(model: Model, fast: Gait = FAST) -> list[Row]:
-    """Every row for a model and its fastest gait; takes about a second."""
+    """All rows for a model and its fastest gait. Takes about a second."""
     return [*_speeds(model, fast), *_forces(model), *_steps(model), *_tunnel(model, fast)]
 
 
@@ -98,7 +98,7 @@ def _steps(model: Model) -> list[Row]:
             "about 2",
             f"{offset:.1f}",
             abs(offset - 2.0) < 0.5,
-            "with 4 N of hysteresis added: the steep ends of K let it move them no further",
+            "with 4 N of hysteresis added; K is too steep at its ends for a larger offset",
         ),
     ]
 
@@ -113,7 +113,7 @@ def _tunnel(model: Model, fast: Gait) -> list[Row]:
 
 
 def obstacle_rows(model: Model, fast: Gait = FAST) -> list[tuple[str, str, Passing]]:
-    """(obstacle, gait, how it went) for the paper's obstacles and its gaits."""
+    """Rows (obstacle, gait, result) for the paper's obstacles and gaits."""
     gaits = {"fastest": fast, "baseline": BASELINE, "6 s": SLOW}
     return [
         (obstacle, name, passing(model, gait, ahead(), Supports()))

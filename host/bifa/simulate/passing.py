@@ -1,4 +1,4 @@
-"""Does a gait carry the robot through obstacles, and if not, why (paper, section VI.B)."""
+"""Whether a gait carries the robot through obstacles, and if not, why (paper, section VI.B)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _SETTLED_CYCLES = 6
 
 @dataclass(frozen=True)
 class Stroke:
-    """One stroke of the body, against the supports of the end that it moves.
+    """One stroke of the body against the supports of the end that it moves. Forces are pressure times area.
 
-    needed_N: of pressure times area, to take the spring over its peak while the stiffest supports bend.
-    built_up_N: what the gait leaves the time for, walking in a clear pipe.
+    needed_N: to push the spring over its peak while the stiffest supports bend.
+    built_up_N: reached within the gait's cycle when walking in a clear pipe.
     """
 
     needed_N: float
@@ -29,15 +29,15 @@ class Stroke:
 
     @property
     def enough(self) -> bool:
-        """False: the stroke stalls where it meets the obstacle before the spring's peak."""
+        """Whether the force suffices. If not, the stroke stalls if it meets the obstacle before the spring's peak."""
         return self.built_up_N >= self.needed_N
 
 
 @dataclass(frozen=True)
 class Passing:
-    """`seconds` until the whole robot is behind the last obstacle, NaN if it is not in `LONGEST_S`.
+    """`seconds` until the whole robot is past the last obstacle; NaN if that takes longer than `LONGEST_S`.
 
-    Extension pushes the head's supports in, contraction pulls the tail's.
+    Extension pushes the head's supports into the obstacle, contraction pulls the tail's.
     """
 
     seconds: float
@@ -46,7 +46,7 @@ class Passing:
 
     @property
     def through(self) -> bool:
-        """Whether it got through."""
+        """Whether the robot got through."""
         return bool(np.isfinite(self.seconds))
 
 
@@ -57,7 +57,7 @@ def passing(
     supports: Supports,
     inclination_deg: float = 0.0,
 ) -> Passing:
-    """Walk the gait into the obstacles."""
+    """Walk a gait into obstacles, and compare its forces with those that the obstacles need."""
     ground = terrain(obstacles, supports)
     cycles = max(1, int(LONGEST_S / gait.period_s))
     record = walk(model, gait, cycles, inclination_deg=inclination_deg, terrain=ground)

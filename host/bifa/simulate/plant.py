@@ -1,4 +1,4 @@
-"""A model as the compiled code reads it."""
+"""The flat form of a model that compiled code reads."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bifa.simulate import layout, learnt
 from bifa.simulate.tables import Tabulated, sealed, tabulated
 
 _NOTHING = np.zeros((0, 4))
-_POINTS = 513  # of a row of `Plant.learnt`: fine enough for the lips of a pipe's joints
+_POINTS = 513  # values per row of `Plant.learnt`: fine enough for the lips at a pipe's joints
 _TERMS = {
     "filling": (learnt.IN_FILLING, learnt.FILLING, learnt.EMPTYING),
     "friction_speed": (learnt.IN_FRICTION_SPEED, learnt.FORWARD, learnt.BACKWARD),
@@ -27,8 +27,9 @@ _TERMS = {
 
 
 class Plant(NamedTuple):
-    """`q`: numbers as `layout` has them; `active`: a bit for each effect and each place of a learnt curve; the curves:
-    `bifa.simulate.tables`; `learnt`: see `bifa.simulate.learnt`."""
+    """A model for compiled code. `q`: parameters in the order of `layout`; `active`: a bit for each effect and each
+    place of a learnt curve; `body_curve`, `small_curve`: see `bifa.simulate.tables`; `learnt`: see
+    `bifa.simulate.learnt`."""
 
     q: np.ndarray
     active: int
@@ -38,7 +39,7 @@ class Plant(NamedTuple):
 
 
 def plant(model: Model | Plant) -> Plant:
-    """The flat form of a model. Effects whose sizes are all 0 are inactive: exactly the base model."""
+    """Convert a model to its flat form. Effects whose sizes are all 0 are inactive and leave exactly the base model."""
     if isinstance(model, Plant):
         return model
     body, small = tabulated(model.body_stiffness), tabulated(model.small_stiffness)
@@ -51,7 +52,7 @@ def plant(model: Model | Plant) -> Plant:
 def of_values(
     values: Mapping[str, float], active: Mapping[str, Mapping[str, float]], body: Tabulated, small: Tabulated
 ) -> Plant:
-    """A plant from values by name (those of effects too), the active effects' own, and the two curves."""
+    """Make a plant from values by name (including those of effects), the active effects' values, and the two curves."""
     q = np.zeros(layout.size())
     q[[layout.index(name) for name in values]] = list(values.values())
     q[layout.BODY + layout.MASS] = values["head_mass_kg"]
@@ -67,7 +68,7 @@ def of_values(
 
 
 def _mask(active: Mapping[str, Mapping[str, float]]) -> int:
-    """The bits of the effects with a size other than 0."""
+    """Bits of the effects that have a nonzero size."""
     bits = 0
     for name, values in active.items():
         if any(values[size.name] != 0.0 for size in effects.library()[name].sizes):
@@ -91,7 +92,7 @@ def with_curve(plant: Plant, name: str, curve: LearntCurve) -> Plant:
 
 
 def _added(rows: np.ndarray, curve: LearntCurve) -> np.ndarray:
-    """A stiffness table (`bifa.simulate.tables`) plus a curve."""
+    """The sum of a stiffness table (`bifa.simulate.tables`) and a curve."""
     nodes = np.linspace(rows[0, 0], rows[0, 1], rows.shape[0])
     added = curve.at(nodes)
     total = rows.copy()

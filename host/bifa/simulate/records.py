@@ -1,4 +1,4 @@
-"""Simulated experiments: each gives the columns that a data set of the real one has, at the data's times."""
+"""Simulated experiments. Each returns the columns of a recorded data set, sampled at the data's times."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ _WALK_HZ, _STEP_HZ = 100.0, 100.0
 
 @dataclass(frozen=True)
 class SimulatedTrial:
-    """`columns` as in a data set's CSV (contracted = 0, mm, N, psi), `states` what no instrument sees (SI, psi)."""
+    """One simulated experiment. `columns`: as in a data set's CSV (contracted = 0, mm, N, psi); `states`: quantities
+    that no instrument measures (SI, psi)."""
 
     experiment: str
     columns: Mapping[str, np.ndarray]
@@ -60,10 +61,10 @@ def walk(
     terrain: np.ndarray = rigs.CLEAR,
     tolerance_m: float = TOLERANCE_M,
 ) -> SimulatedTrial:
-    """A walk from rest (vented, contracted) at time 0, by a settled gait or by given commands.
+    """Simulate a walk from rest (vented, contracted) at time 0, driven by a settled gait or by given commands.
 
-    `time_s`: (n,) rising sample times from 0 on; left out, 100 Hz for `cycles` periods. `tolerance_m` bounds the
-    estimated error of a position in one step.
+    `time_s`: (n,) nondecreasing sample times, none negative; by default 100 Hz for `cycles` periods. `tolerance_m`
+    bounds the estimated error of a position in one step.
     """
     if time_s is None:
         if gait is None:
@@ -90,9 +91,10 @@ def walks(
     together: bool = False,
     states: bool = True,
 ) -> list[SimulatedTrial]:
-    """`walk` for each robot, each by its own commands; times are taken as they are, as in all functions for many here:
-    contiguous floats that rise from 0 on. `together`: they differ little and are to be compared with the first
-    (`bifa.simulate.lanes.march`). Without `states` a record has but times, displacements and pressures."""
+    """Run `walk` for each robot with its own commands. Sample times are not validated, here and in the other functions
+    for several robots: they must be contiguous, nondecreasing and not negative. `together`: the robots differ little
+    and will be compared with the first (`bifa.simulate.lanes.march`). Without `states`, records contain only times,
+    displacements and pressures."""
     flats = [plant(model) for model in models]
     mounted = [rigs.pipe(flat, degrees, terrain) for flat, degrees in zip(flats, inclinations_deg, strict=True)]
     kind, walked = (lanes.WALK, _walked) if states else (lanes.SEEN, _seen)
@@ -141,11 +143,11 @@ def step_response(
     pressure_psi: float | None = None,
     tolerance_m: float = TOLERANCE_M,
 ) -> SimulatedTrial:
-    """One actuator ("large" or "small") on its stand, at rest under vacuum at time 0.
+    """Simulate a step response of one actuator ("large" or "small") on its stand, at rest under vacuum at time 0.
 
-    `command`: (n,) at `time_s`, 1 positive, 0 vacuum, NaN off, a switch where the new one is first seen; or a
-    timeline of chamber 0. Left out: positive after 0.5 s, vacuum after 6 s, 12 s in all. `pressure_psi`: the
-    positive supply, the model's own if left out; the negative one is the model's.
+    `command`: (n,) at `time_s`, 1 positive, 0 vacuum, NaN off, switching at the first sample with the new value; or a
+    timeline of chamber 0. Without times and commands: positive after 0.5 s, vacuum after 6 s, 12 s in all.
+    `pressure_psi`: the positive supply, by default the model's; the negative supply is always the model's.
     """
     if time_s is None:
         time_s = np.arange(int(12.0 * _STEP_HZ) + 1) / _STEP_HZ
@@ -173,7 +175,7 @@ def step_responses(
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
 ) -> list[SimulatedTrial]:
-    """`step_response` for each robot, with its own commands, which are not among the columns, and its own supply;
+    """Run `step_response` for each robot with its own commands and supply. The columns do not include the commands.
     `together` as in `walks`."""
     flats = [plant(model) for model in models]
     mounted = [rigs.stand(flat, actuator, supply) for flat, supply in zip(flats, pressures_psi, strict=True)]
@@ -187,7 +189,7 @@ def step_responses(
 
 
 def _shown(command: Timeline, time_s: np.ndarray) -> np.ndarray:
-    """A stand's command at times; before the first it is at vacuum."""
+    """Commands on a stand at the given times; vacuum before the first switch."""
     shown = command.at(time_s)[:, 0].astype(float)
     shown[time_s < command.time_s[0] if command.time_s.size else np.ones(time_s.size, bool)] = 0.0
     shown[shown == OFF] = np.nan
@@ -197,9 +199,10 @@ def _shown(command: Timeline, time_s: np.ndarray) -> np.ndarray:
 def static_loading(
     model: Model | Plant, actuator: str, time_s: np.ndarray, displacement_mm: np.ndarray, pressure_psi: float
 ) -> SimulatedTrial:
-    """The force that moves one actuator's end along `displacement_mm` (n,), its pressure held at `pressure_psi`.
+    """Simulate the force that moves one actuator's end along `displacement_mm` (n,), with its pressure held at
+    `pressure_psi`.
 
-    Quasi-static: K(x) - a p. Give the cross-head's path, not its noisy reading, or hysteresis sees the noise.
+    Quasi-static: K(x) - a p. Pass the cross-head's path, not its noisy reading, or hysteresis responds to the noise.
     """
     time_s, path_mm = _times(time_s), np.ascontiguousarray(displacement_mm, dtype=float)
     if path_mm.shape != time_s.shape or not np.all(np.isfinite(path_mm)):
@@ -214,7 +217,7 @@ def static_loadings(
     displacements_mm: Sequence[np.ndarray],
     pressures_psi: Sequence[float],
 ) -> list[SimulatedTrial]:
-    """`static_loading` for each robot, along its own path and at its own pressure."""
+    """Run `static_loading` for each robot along its own path and at its own pressure."""
     flats, paths = [plant(model) for model in models], [path / _MM for path in displacements_mm]
     mounted = [rigs.stand(flat, actuator, psi) for flat, psi in zip(flats, pressures_psi, strict=True)]
     found = lanes.load(flats, mounted, paths, time_s)
@@ -230,10 +233,10 @@ def anchor_pull(
     extended_psi: float = 0.0,
     tolerance_m: float = TOLERANCE_M,
 ) -> SimulatedTrial:
-    """A pressurised head pulled through the pipe (negative rate: backward) through a load cell's spring.
+    """Simulate pulling a pressurised head through the pipe (negative rate: backward) by the spring of a load cell.
 
-    Quasi-static. The head was extended first, by `extended_psi` if that is more than it is then held at;
-    `displacement_mm` is that of the pulling end.
+    Quasi-static. The head is first extended at `extended_psi` or `pressure_psi`, whichever is greater, then held at
+    `pressure_psi`. `displacement_mm` is the displacement of the pulling end.
     """
     pull = (rate_mm_s, [pressure_psi], load_cell_N_m, extended_psi)
     return anchor_pulls([model], [_times(time_s)], *pull, tolerance_m)[0]
@@ -249,9 +252,9 @@ def anchor_pulls(
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
 ) -> list[SimulatedTrial]:
-    """`anchor_pull` for each robot, each at its own pressure; `together` as in `walks`."""
+    """Run `anchor_pull` for each robot at its own pressure. `together` as in `walks`."""
     if not np.isfinite(rate_mm_s) or rate_mm_s == 0.0 or not load_cell_N_m > 0.0:
-        raise SimulationError("an anchor pull needs a rate other than 0 and a load cell stiffer than 0 N/m")
+        raise SimulationError("an anchor pull needs a nonzero rate and a load cell stiffness above 0 N/m")
     flats = [plant(model) for model in models]
     mounted = [rigs.anchor(flat, psi) for flat, psi in zip(flats, pressures_psi, strict=True)]
     what = lanes.Experiment(
@@ -274,16 +277,16 @@ def anchor_pulls(
 def _forced(
     experiment: str, time_s: np.ndarray, displacement_mm: np.ndarray, rows: np.ndarray, states: Sequence[str] = ()
 ) -> SimulatedTrial:
-    """A record whose rows are force, reading, and `states`."""
+    """A record from rows of force, pressure reading, and then `states`."""
     columns = {"time_s": time_s, "displacement_mm": displacement_mm, "force_N": rows[0], "pressure_psi": rows[1]}
     return SimulatedTrial(experiment, columns, dict(zip(states, rows[2:], strict=True)))
 
 
 def as_stamped(flat: Plant, time_s: np.ndarray, position_m: np.ndarray, velocity_m_s: np.ndarray) -> np.ndarray:
-    """Positions (n,) as an instrument stamps them whose clock the effects shift: what was there at other times."""
+    """Positions (n,) as recorded by an instrument whose clock the effects shift."""
     late_s = chains.stamp(flat.active, flat.q) if flat.active & chains.STAMP else 0.0
     if late_s == 0.0 or not (np.isfinite(position_m).all() and np.isfinite(velocity_m_s).all()):
-        return position_m  # a run that was given up is NaN whenever it is stamped
+        return position_m  # an abandoned run is NaN at any time stamp
     then_s = time_s - late_s
     inside_s = np.clip(then_s, time_s[0], time_s[-1])
     rising_s, first = np.unique(time_s, return_index=True)
@@ -297,7 +300,7 @@ def _times(time_s: ArrayLike) -> np.ndarray:
     if time_s.ndim != 1 or time_s.size == 0 or not np.all(np.isfinite(time_s)):
         raise SimulationError("sample times must be a list of numbers")
     if time_s[0] < 0.0 or np.any(np.diff(time_s) < 0.0):
-        raise SimulationError("sample times must rise, from 0 on")
+        raise SimulationError("sample times must not be negative and must not decrease")
     return time_s
 
 

@@ -1,4 +1,4 @@
-"""Where the robot, or a part of it, is mounted in each experiment."""
+"""The mounting of the robot, or of a part of it, in each experiment."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from bifa.simulate.stepper import HAS_BODY, HAS_HEAD, HAS_TAIL, Mounting
 
 CLEAR = np.zeros((0, 0))
 ACTUATORS = ("large", "small")
-_SMALL_ACTUATORS = 3  # of a head or tail segment
+_SMALL_ACTUATORS = 3  # per head or tail segment
 
 
 class SimulationError(BifaError):
-    """What was asked cannot be simulated; the text says why."""
+    """A requested simulation is impossible; the text says why."""
 
 
 def pipe(plant: Plant, inclination_deg: float = 0.0, terrain: np.ndarray = CLEAR) -> Mounting:
-    """The whole robot in a pipe, uphill positive."""
+    """The whole robot in a pipe; a positive inclination is uphill."""
     if not -90.0 <= inclination_deg <= 90.0:
         raise SimulationError(f"inclination_deg = {inclination_deg:g} is outside its range -90 to 90")
     segment = _SMALL_ACTUATORS * plant.q[layout.SMALL + layout.VOLUME]
@@ -38,7 +38,7 @@ def pipe(plant: Plant, inclination_deg: float = 0.0, terrain: np.ndarray = CLEAR
 
 
 def stand(plant: Plant, actuator: str, positive_psi: float) -> Mounting:
-    """One actuator, its bigger end clamped, on a level stand."""
+    """One actuator on a level stand, with its bigger end clamped."""
     if actuator not in ACTUATORS:
         raise SimulationError(f"actuator {actuator!r} is not one of {', '.join(ACTUATORS)}")
     small = plant.q[layout.SMALL + layout.VOLUME]

@@ -26,14 +26,14 @@ from bifa.simulate.stepper import (
 from bifa.simulate.timeline import delayed
 from bifa.simulate.together import anywhere
 
-SETTLE_S = 30.0  # of a step response's vacuum, many times every time constant
-HOLD_S = 20.0  # of the pressure before a static loading or a pull, and of the one before that which extended the head
+SETTLE_S = 30.0  # under vacuum before a step response: many times every time constant
+HOLD_S = 20.0  # at the test pressure before a static loading or a pull; before a pull, as long again to extend the head
 _SUBSTEP_S = 0.005
 
 
 @merged
 def _places(rig):
-    """Actuator, block, and places of position and pressure in y of a stand's only actuator."""
+    """Actuator, block, and indices of position and pressure in y, for the only actuator of a stand."""
     if rig.parts & HAS_BODY:
         return 0, layout.BODY, X_HEAD, P_BODY
     return 1, layout.SMALL, X_SMALL_HEAD, P_BODY + 3
@@ -41,7 +41,7 @@ def _places(rig):
 
 @merged
 def held(plant, rig, run, start, command, seconds):
-    """Put a new run at `start`, at rest and vented, where `command` is given `seconds` before time 0."""
+    """Initialise a run at position `start`, at rest and vented, with `command` applied `seconds` before time 0."""
     actuator, _, x, _ = _places(rig)
     run.y[x] = start
     run.clock[0] = -seconds
@@ -51,7 +51,7 @@ def held(plant, rig, run, start, command, seconds):
 
 @merged
 def under_vacuum(plant, rig, run):
-    """Put a new run where a step response starts."""
+    """Initialise a run at the start of a step response."""
     _, block, _, _ = _places(rig)
     held(plant, rig, run, plant.q[block + layout.CONTRACTED], VACUUM, SETTLE_S)
 
@@ -65,13 +65,13 @@ def _supplied(rig, positive_psi):
 
 @merged
 def anchored(plant, rig, run):
-    """Put a new run where the head of an anchor pull is extended."""
+    """Initialise a run at the start of an anchor pull, where the head is extended."""
     held(plant, rig, run, plant.q[layout.WALL_OFFSET], POSITIVE, 2.0 * HOLD_S)
 
 
 @merged
 def step_row(plant, rig, run, row):
-    """Displacement from contracted in m, velocity, reading in psi, into (3,)."""
+    """Write displacement from contracted in m, velocity in m/s and pressure reading in psi into `row` (3,)."""
     actuator, block, x, _ = _places(rig)
     row[0] = run.y[x] - plant.q[block + layout.CONTRACTED]
     row[1] = run.y[x + 1]
@@ -80,7 +80,7 @@ def step_row(plant, rig, run, row):
 
 @kernel
 def step_record(plant, rig, states_of_effects, times, command, sample_times, tolerance):
-    """(n, 3): displacement from contracted in m, velocity, reading in psi; at rest under vacuum at time 0."""
+    """Simulate a step response, at rest under vacuum at time 0. Returns rows of `step_row`, (n, 3)."""
     actuator, _, _, _ = _places(rig)
     run = new_run(states_of_effects)
     under_vacuum(plant, rig, run)
@@ -97,10 +97,11 @@ def step_record(plant, rig, states_of_effects, times, command, sample_times, tol
 
 @kernel
 def static_record(plant, rig, states_of_effects, displacement, sample_times):
-    """(n, 2): force of the testing machine in N, reading in psi, while it moves the end along `displacement` (n,).
+    """Simulate a static loading along `displacement` (n,). Returns (n, 2): the testing machine's force in N and the
+    pressure reading in psi.
 
-    Quasi-static: K(x) - a p without the damper; the air, and what the effects remember, run in time. The pressure
-    has been held for a while when the record begins.
+    Quasi-static: K(x) - a p without the damper, while the air and the states of the effects evolve in time. The
+    pressure is held for `HOLD_S` before the record begins.
     """
     out = np.empty((sample_times.size, 2))
     run = new_run(states_of_effects)
@@ -110,14 +111,14 @@ def static_record(plant, rig, states_of_effects, displacement, sample_times):
 
 @merged
 def static_rows(plant, rig, run, displacement, sample_times, out):
-    """`static_record` with a new run, into `out`."""
+    """Compute `static_record` with a new run, into `out`."""
     actuator, block, x, p = _places(rig)
     contracted = plant.q[block + layout.CONTRACTED]
     y, z = run.y, run.z
     y[x] = contracted + displacement[0]
     run.command[actuator] = POSITIVE
     start_effects(plant, rig, run)
-    wavering = anywhere(plant.active & chains.SUPPLY)  # else nothing changes the pressure that a chamber is given
+    wavering = anywhere(plant.active & chains.SUPPLY)  # otherwise the supply pressure is constant
     now = sample_times[0] - HOLD_S
     before = y[x]
     for k in range(sample_times.size):
@@ -150,12 +151,13 @@ def static_rows(plant, rig, run, displacement, sample_times, out):
 
 @kernel
 def anchor_record(plant, rig, states_of_effects, extended_psi, rate, load_cell, sample_times, tolerance):
-    """(n, 5): resistance in N, reading in psi, of a head pulled at `rate` m/s (its sign: direction); then what the load
-    cell would pull if the head held, what the head holds at most, and its friction when it slides, in N.
+    """Simulate pulling a head at `rate` m/s (the sign is the direction). Returns (n, 5): resistance in N, pressure
+    reading in psi, the load cell's pull if the head did not slip, the greatest static friction, and the kinetic
+    friction, in N.
 
-    The head has been extended by `extended_psi`, if that is more, and then held at `rig.positive_psi`. Quasi-static:
-    the load cell's spring takes up force until static friction gives, then kinetic friction at the speed of pulling
-    remains.
+    The head is first extended at `extended_psi` or `rig.positive_psi`, whichever is greater, then held at the latter.
+    Quasi-static: force builds up in the load cell's spring until static friction gives way; then kinetic friction at
+    the pulling speed remains.
     """
     run = new_run(states_of_effects)
     anchored(plant, rig, run)
@@ -171,7 +173,7 @@ def anchor_record(plant, rig, states_of_effects, extended_psi, rate, load_cell, 
 
 @merged
 def anchor_row(plant, rig, run, rate, load_cell, row):
-    """A row of `anchor_record` now; `run.slip` is 1 once the head slides."""
+    """Write the present row of `anchor_record`; `run.slip` is 1 once the head slides."""
     direction = 1.0 if rate > 0.0 else -1.0
     slack = chains.slack(plant.active, plant.q)
     normal = grip(plant, rig, run.gravity, 0, run.y)

@@ -1,8 +1,8 @@
-"""One step of the robot, or of one actuator on its stand: eq. (1)-(8), velocities linearly implicit.
+"""One step of the robot, or of one actuator on its stand, by eq. (1)-(8) with linearly implicit velocities.
 
-Friction (5) is set-valued Coulomb friction: an end that rests has exactly zero velocity and stays while the force
-on it is at most mu_s N; one that slides meets mu_k N and comes to exact rest when its velocity would change sign.
-(The paper's eq. (5) lets an end creep inside its speed threshold; docs/model.md.)
+Friction (5) is set-valued Coulomb friction. An end at rest has exactly zero velocity and stays at rest while the force
+on it is at most mu_s N; a sliding end meets mu_k N and comes to exact rest when its velocity would change sign. (With
+the paper's eq. (5), an end creeps below the speed threshold; see docs/model.md.)
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ X_HEAD, V_HEAD, X_TAIL, V_TAIL, P_BODY, X_SMALL_HEAD, V_SMALL_HEAD, P_HEAD, X_SM
     11
 )
 STATES = 11
-# Parts of the robot that are there
+# Parts of the robot that are present
 HAS_BODY, HAS_HEAD, HAS_TAIL = 1, 2, 4
-# Commands of a chamber
+# Commands for a chamber
 VACUUM, POSITIVE, OFF = 0, 1, 2
 
-_WALL_COUNT = 3.0  # eq. (7): three actuators a segment
-_LEAST_GROWTH = 0.05  # of the damping: below, the step is too long for the falling part of K
-_ALIKE = 1e-9  # relative difference of two holds that counts as none
+_WALL_COUNT = 3.0  # eq. (7): three actuators per segment
+_LEAST_GROWTH = 0.05  # share of the damping below which a step is too long for the falling part of K
+_ALIKE = 1e-9  # relative difference below which two holding forces count as equal
 TOO_LONG = -1
 
 
 class Mounting(NamedTuple):
-    """Where the robot, or a part of it, is mounted, and what feeds it.
+    """How the robot, or a part of it, is mounted and supplied.
 
-    `parts`: HAS_ bits. `free` = 1: the body's smaller end moves freely, the other is clamped (step response).
-    `wall` = 0: no pipe around the small actuators. `terrain`: see `bifa.simulate.terrain`; no rows: clear pipe.
-    `share`: (3,) volume of body, head and tail chamber that a supply sees, over the body's.
+    `parts`: HAS_ bits. `free` = 1: the body's smaller end moves freely and the other is clamped (step response).
+    `wall` = 0: no pipe around the small actuators. `terrain`: see `bifa.simulate.terrain`; empty for a clear pipe.
+    `share`: (3,) volumes of the body, head and tail chambers, as seen by a supply, over the body's.
     """
 
     parts: int
@@ -55,7 +55,7 @@ class Mounting(NamedTuple):
 
 @merged
 def gravity_of(plant, rig, gravity):
-    """Gravity along the pipe, downhill, and against its wall, m/s^2, into (2,); a stand is level."""
+    """Write gravity along the pipe (downhill) and against its wall, m/s^2, into `gravity` (2,). Stands are level."""
     incline = rig.incline_rad
     if not rig.free:
         incline += chains.incline(plant.active, plant.q)
@@ -64,7 +64,7 @@ def gravity_of(plant, rig, gravity):
 
 @merged
 def sources(plant, rig, command, y, now, source):
-    """Pressure that the valves give each chamber now, into `source` (3,): eq. (2)'s p_d."""
+    """Write the pressure that the valves supply to each chamber, p_d of eq. (2), into `source` (3,)."""
     q, active = plant.q, plant.active
     positive, negative = rig.positive_psi, rig.negative_psi
     if active & chains.SUPPLY:
@@ -94,8 +94,8 @@ def _loaded(plant, rig, command, y, which, supply):
 def step(plant, rig, gravity, source, y, z, h, y_new, z_new):
     """Advance `y`, `z` by `h` into `y_new`, `z_new`.
 
-    Returns a number that is equal for steps of the same kind (who slides, who touches the wall, which alpha),
-    or TOO_LONG. `source`: (3,) psi; `gravity`: (2,) of `gravity_of`.
+    Returns a number that identifies the kind of step (which ends slide, which actuators touch the wall, which alpha
+    applies), or TOO_LONG. `source`: (3,) psi; `gravity`: (2,) from `gravity_of`.
     """
     kind = 0
     if plant.active:
@@ -119,7 +119,7 @@ def step(plant, rig, gravity, source, y, z, h, y_new, z_new):
 
 @merged
 def squeeze(terrain, row, position):
-    """Value of a terrain's row at a position, 0 in a clear pipe."""
+    """Value of a terrain's row at a position; 0 in a clear pipe."""
     return 0.0 if terrain.shape[0] == 0 else _squeezed(terrain, row, position)
 
 
@@ -137,7 +137,7 @@ def _squeezed(terrain, row, position):
 
 @merged
 def wall_force(plant, x, v, narrower):
-    """Eq. (8), clipped: the wall cannot pull."""
+    """Force of the wall by eq. (8), clipped at 0: the wall cannot pull."""
     q = plant.q
     depth = x - (q[layout.WALL_OFFSET] - narrower)
     if depth <= 0.0:
@@ -176,10 +176,10 @@ def _small(plant, rig, actuator, source, y, z, h, y_new, z_new, narrower):
 
 @merged
 def grip(plant, rig, gravity, end, y):
-    """Normal force (7) of an end, from the wall's force on its small actuator."""
+    """Normal force of an end by eq. (7), from the wall's force on its small actuator."""
     q = plant.q
     mass = q[layout.HEAD_MASS] if end == 0 else q[layout.TAIL_MASS]
-    if rig.free:  # a head segment alone, without its half of the body
+    if rig.free:  # a single head segment, without its half of the body
         mass = q[layout.SEGMENT_MASS]
     at = X_SMALL_HEAD + 3 * end
     narrower = squeeze(rig.terrain, 5 + end, y[X_HEAD if end == 0 else X_TAIL])
@@ -188,7 +188,7 @@ def grip(plant, rig, gravity, end, y):
 
 @merged
 def coefficient(plant, direction, sliding):
-    """Coefficient of friction for a direction; `sliding` is the speed, 0 for an end at rest."""
+    """Coefficient of friction in a direction; `sliding` is the speed, 0 for an end at rest."""
     q, active = plant.q, plant.active
     rest = max(q[layout.MU_S], q[layout.MU_K])
     base = rest if sliding == 0.0 else q[layout.MU_K]
@@ -202,7 +202,7 @@ def coefficient(plant, direction, sliding):
 
 @merged
 def _limit(plant, rig, end, normal, direction, sliding, y):
-    """Greatest friction of an end against motion in a direction."""
+    """Greatest friction force at an end against motion in a direction."""
     force = coefficient(plant, direction, sliding) * normal
     place = y[X_HEAD if end == 0 else X_TAIL]
     if plant.active & learnt.IN_GRIP_PLACE:
@@ -248,7 +248,7 @@ def _body(plant, rig, gravity, source, y, z, h, y_new, z_new):
 
 @merged
 def _ends(plant, rig, gravity, tension, growth, y, y_new, h):
-    """Velocities of head and tail after a step, with friction; and who moves where, as 3 (s_h + 1) + s_t + 1."""
+    """Velocities of head and tail after a step with friction, and their directions s as 3 (s_h + 1) + s_t + 1."""
     q = plant.q
     uphill = gravity[0]
     m_h, m_t = q[layout.HEAD_MASS] / h, q[layout.TAIL_MASS] / h
@@ -283,7 +283,7 @@ def _ends(plant, rig, gravity, tension, growth, y, y_new, h):
         if s_h != 0.0 and w_h * s_h <= 0.0:
             s_h, may_h = 0.0, False
             weaker, _ = _first_to_start(plant, rig, normal_h, normal_t, push_h, push_t, y)
-            may_t = may_t and weaker == 0.0  # else the head, in the next step: to stop first is no privilege
+            may_t = may_t and weaker == 0.0  # if the head's hold is the weaker one, it starts in the next step
             continue
         if s_t != 0.0 and w_t * s_t <= 0.0:
             s_t, may_t = 0.0, False
@@ -310,8 +310,9 @@ def _ends(plant, rig, gravity, tension, growth, y, y_new, h):
 
 @merged
 def _first_to_start(plant, rig, normal_h, normal_t, push_h, push_t, y):
-    """Directions of two resting ends whose hold gives in the same step: of unequal holds the weaker goes alone, as
-    the damper then relieves the other; equal ones (both ends free, equal halves) go together."""
+    """Directions in which two resting ends start to slide if friction gives way at both in the same step. If the
+    holding forces differ, the weaker end starts alone, since the damper then unloads the other; if they are equal (both
+    ends free, equal halves), both start together."""
     side_h, side_t = _sign(push_h), _sign(push_t)
     hold_h = _limit(plant, rig, 0, normal_h, side_h, 0.0, y)
     hold_t = _limit(plant, rig, 1, normal_t, side_t, 0.0, y)
@@ -325,7 +326,7 @@ def _first_to_start(plant, rig, normal_h, normal_t, push_h, push_t, y):
 
 @merged
 def _starts(plant, rig, end, normal, push, y):
-    """Direction in which a resting end starts to slide under `push`, 0 if friction holds it."""
+    """Direction in which a resting end starts to slide under `push`; 0 if friction holds it."""
     if push > 0.0:
         return 1.0 if push > _limit(plant, rig, end, normal, 1.0, 0.0, y) else 0.0
     return -1.0 if -push > _limit(plant, rig, end, normal, -1.0, 0.0, y) else 0.0

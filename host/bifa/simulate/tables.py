@@ -1,7 +1,7 @@
-"""Stiffness curves as the integrator reads them: tables of cubic pieces, and where they are at rest.
+"""Stiffness curves for the integrator: tables of cubic pieces, and their equilibria.
 
-A table is linear in the curve's coefficients. So of a family of curves (one, and ways in which it may change) each
-member's table is a sum of tables made once: microseconds in place of milliseconds.
+A table is linear in the curve's coefficients. For a family of curves (a base curve and the ways in which it may
+change), each member's table is therefore a weighted sum of precomputed tables: microseconds instead of milliseconds.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from bifa.robot.stiffness import NOT_BISTABLE, StiffnessCurve
 
 _INTERVALS = 256
 _MOST_STEPS = 60
-_ENOUGH = 1e-13  # of an interval
+_ENOUGH = 1e-13  # tolerance of a root, as a share of an interval
 
 
 @lru_cache(maxsize=64)
 def table(curve: StiffnessCurve) -> np.ndarray:
-    """(n + 1, 4): row 0 is lower end, upper end, 1 / width of an interval; then cubic coefficients of each interval.
+    """Tabulate a curve, shape (n + 1, 4). Row 0 is lower end, upper end, 1 / width of an interval; the other rows are
+    the cubic coefficients of each interval.
 
-    Cubic Hermite through force and slope: within 1e-6 N of the polynomial on the nominal curves. Read-only, as every
-    table is: numba would compile its functions once more for one that can be written.
+    The pieces are cubic Hermite through force and slope: within 1e-6 N of the polynomial for the nominal curves. All
+    tables are read-only, since numba would compile its functions a second time for writable ones.
     """
     nodes = np.linspace(curve.lower_m, curve.upper_m, _INTERVALS + 1)
     width = nodes[1] - nodes[0]
@@ -41,14 +42,14 @@ def table(curve: StiffnessCurve) -> np.ndarray:
 
 
 def sealed(rows: np.ndarray) -> np.ndarray:
-    """The same table, read-only."""
+    """Make a table read-only and return it."""
     rows.setflags(write=False)
     return rows
 
 
 @dataclass(frozen=True)
 class Tabulated:
-    """A table and its equilibria, as those of a `StiffnessCurve`."""
+    """A table and its equilibria, defined as for a `StiffnessCurve`."""
 
     rows: np.ndarray
     contracted_m: float
@@ -62,27 +63,27 @@ class Tabulated:
 
 
 def tabulated(curve: StiffnessCurve) -> Tabulated:
-    """A curve's table with the curve's own equilibria; ModelParameterError if it is not bistable."""
+    """Tabulate a curve with its own equilibria. Raises ModelParameterError if it is not bistable."""
     return Tabulated(table(curve), *curve.equilibria_m)
 
 
 class Family:
-    """Curves on one range: `curve`, and each of `ways` added to it as often as one says."""
+    """Curves on one range: `curve` plus a weighted sum of `ways`."""
 
     def __init__(self, curve: StiffnessCurve, ways: Sequence[StiffnessCurve]):
         self._first = table(curve)
         self._ways = np.array([table(way)[1:].ravel() for way in ways]).reshape(len(ways), 4 * _INTERVALS)
 
-    @lru_cache(maxsize=128)  # noqa: B019 - holds a family back at most until 128 other tables were asked for
+    @lru_cache(maxsize=128)  # noqa: B019 - keeps a family alive at most until 128 other tables have been requested
     def at(self, weights: tuple[float, ...]) -> Tabulated:
-        """The member with so much of each way; ModelParameterError if it is not bistable."""
+        """The member with these weights of the ways. Raises ModelParameterError if it is not bistable."""
         rows = self._first.copy()
         rows[1:] += (np.asarray(weights) @ self._ways).reshape(_INTERVALS, 4)
         return Tabulated(sealed(rows), *_equilibria(rows))
 
 
 def _equilibria(rows: np.ndarray) -> tuple[float, float, float]:
-    """Contracted stable, unstable and extended stable point of a table: `StiffnessCurve.equilibria_m`."""
+    """Contracted stable, unstable and extended stable point of a table, as `StiffnessCurve.equilibria_m`."""
     below = np.append(rows[1:, 0], rows[-1].sum()) < 0.0
     crossings = np.flatnonzero(below[1:] != below[:-1])
     rising = [i for i in crossings if below[i]]
@@ -98,7 +99,8 @@ def _equilibria(rows: np.ndarray) -> tuple[float, float, float]:
 
 
 def _zero(piece: list[float]) -> float:
-    """Where a cubic over [0, 1] that changes sign there is 0: Newton's steps, halving where they lead out."""
+    """Root of a cubic that changes sign over [0, 1], by Newton's method with bisection where a step leaves the
+    bracket."""
     c0, c1, c2, c3 = piece
     low, high, at = 0.0, 1.0, 0.5
     for _ in range(_MOST_STEPS):

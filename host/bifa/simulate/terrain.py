@@ -1,9 +1,9 @@
 """Obstacles in the pipe and the supports that buckle under them (paper, sections II.B and VI.B).
 
-A support is pushed into a narrower place by a force up to its buckling force, over the length of its lip; inside it
-drags with a small friction; behind, it springs back to its shape without helping or hindering. The head's and the
-tail's supports meet each obstacle in turn. Where the pipe is narrower, the small actuators reach its wall earlier.
-The paper tuned its supports by trial and gives no forces: those here are assumptions, named as such.
+Pushing a support into a narrower place takes up to its buckling force, over the length of its lip. Inside the obstacle
+it drags with a small friction force; past it, it springs back to its shape without exerting any force. The head's
+supports meet each obstacle first, then the tail's. Where the pipe is narrower, the small actuators reach its wall
+earlier. The paper tuned its supports by trial and gives no forces: the values here are assumptions.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from bifa.simulate.rigs import SimulationError
 
 PIPE_DIAMETER_M = 0.147
 NARROWEST_M = 0.097
-CONTRACTED_LENGTH_M = 0.186  # 240 mm extended, less the stroke: distance of the two rings of supports
+CONTRACTED_LENGTH_M = 0.186  # 240 mm extended minus the stroke: distance between the two rings of supports
 _SPACING_M = 1e-3
 _MARGIN_M = 0.05
 
 
 @dataclass(frozen=True)
 class Supports:
-    """A ring of supports. `buckling_N`: to push all of them in; reached at `buckled_m` of narrowing in radius."""
+    """A ring of supports. `buckling_N`: force that pushes all of them in, reached when the pipe's radius is narrower by
+    `buckled_m`."""
 
     buckling_N: float = 27.0
     friction_N: float = 2.0
@@ -38,7 +39,8 @@ class Supports:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A narrower piece of pipe from `start_m` ahead of the head on. `around`: share of the circumference it takes."""
+    """A narrower piece of pipe that begins `start_m` ahead of the head. `around`: share of the circumference that it
+    covers."""
 
     start_m: float
     length_m: float
@@ -47,7 +49,7 @@ class Obstacle:
 
     @property
     def narrowing_m(self) -> float:
-        """Narrowing in radius."""
+        """Reduction of the pipe's radius."""
         return 0.5 * (PIPE_DIAMETER_M - self.diameter_m)
 
 
@@ -62,34 +64,36 @@ def subtunnels(start_m: float = 0.1) -> tuple[Obstacle, ...]:
 
 
 def arcs(start_m: float = 0.1) -> tuple[Obstacle, ...]:
-    """The paper's arcs of 5, 15 and 25 mm height; each is met by one of three supports."""
+    """The paper's arcs, 5, 15 and 25 mm high; one of the three supports meets each."""
     heights = (0.005, 0.015, 0.025)
     return tuple(
         Obstacle(start_m + 0.12 * i, 0.02, PIPE_DIAMETER_M - 2.0 * h, 1.0 / 3.0) for i, h in enumerate(heights)
     )
 
 
-# By the names that commands take.
+# Keyed by the names used on the command line.
 OBSTACLES = {"tunnel": tunnel, "subtunnels": subtunnels, "arcs": arcs}
 
 
 def obstacles(name: str) -> tuple[Obstacle, ...]:
-    """The obstacles of a name, 10 cm ahead; SimulationError for an unknown one."""
+    """The obstacles of that name, 10 cm ahead of the head. Raises SimulationError for an unknown name."""
     if name not in OBSTACLES:
         raise SimulationError(f"obstacle {name!r} is not one of {', '.join(OBSTACLES)}")
     return OBSTACLES[name]()
 
 
 def terrain(obstacles: Sequence[Obstacle], supports: Supports = Supports()) -> np.ndarray:
-    """(7, n) table for `walk(..., terrain=...)`, over position.
+    """Tabulate obstacles over position, shape (7, n), for `walk(..., terrain=...)`.
 
     Row 0: start, 1 / spacing; rows 1-4: force in N against head forward, head backward, tail forward, tail backward;
-    rows 5, 6: narrowing of the pipe's radius at head and tail, m. SimulationError for what the robot cannot enter.
+    rows 5, 6: narrowing of the pipe's radius at head and tail, m. Raises SimulationError for an obstacle outside the
+    supported dimensions.
     """
     for obstacle in obstacles:
         if not NARROWEST_M - 1e-9 <= obstacle.diameter_m <= PIPE_DIAMETER_M or obstacle.length_m <= 0.0:
             raise SimulationError(
-                f"an obstacle of {obstacle.diameter_m * 1e3:g} mm: the robot passes 97 to 147 mm, over more than 0 mm"
+                "an obstacle's diameter must be 97 to 147 mm and its length positive, not "
+                f"{obstacle.diameter_m * 1e3:g} and {obstacle.length_m * 1e3:g} mm"
             )
     end = max((o.start_m + o.length_m for o in obstacles), default=0.0) + CONTRACTED_LENGTH_M + _MARGIN_M
     x = np.arange(-_MARGIN_M, end, _SPACING_M)
@@ -102,7 +106,7 @@ def terrain(obstacles: Sequence[Obstacle], supports: Supports = Supports()) -> n
 
 
 def passed_at_m(obstacles: Sequence[Obstacle]) -> float:
-    """Displacement of the tail at which the whole robot is behind the last obstacle."""
+    """Displacement of the tail at which the whole robot is past the last obstacle."""
     return max(o.start_m + o.length_m for o in obstacles) + CONTRACTED_LENGTH_M
 
 

@@ -1,6 +1,6 @@
 """Valve commands over time: from a gait, from initial phases, or from a record's command columns.
 
-A timeline is a table of switches in order of time; a chamber that no switch has reached yet is off (vented).
+A timeline is a table of switches in order of time. A chamber is off (vented) before its first switch.
 """
 
 from __future__ import annotations
@@ -25,23 +25,24 @@ _RESOLUTION_S = 1e-3
 
 
 class TimelineError(BifaError):
-    """Commands that cannot be simulated; the text says which."""
+    """Commands cannot be simulated; the text says why."""
 
 
 @dataclass(frozen=True)
 class Timeline:
-    """`time_s` (n,) rising, `chamber` (n,) 0 body, 1 head, 2 tail, `command` (n,) 1 positive, 0 vacuum, 2 off."""
+    """Switches of the valves: `time_s` (n,) in order, `chamber` (n,) 0 body, 1 head, 2 tail, `command` (n,) 1 positive,
+    0 vacuum, 2 off."""
 
     time_s: np.ndarray
     chamber: np.ndarray
     command: np.ndarray
 
-    def __post_init__(self) -> None:  # as compiled code reads them
+    def __post_init__(self) -> None:  # the types that compiled code reads
         for name, kind in (("time_s", float), ("chamber", np.int64), ("command", np.int64)):
             object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=kind))
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
-        """(m, 3) commands in force at times; off before the first."""
+        """Commands in force at the given times, shape (m, 3); off before a chamber's first switch."""
         time_s = np.asarray(time_s, dtype=float)
         state = np.full((time_s.size, 3), OFF)
         for chamber in range(3):
@@ -52,8 +53,8 @@ class Timeline:
 
 
 def vented_between(commands: Timeline, dead_time_s: float) -> Timeline:
-    """The same where a chamber is vented for `dead_time_s` from one supply to the other, as the Uno does it: break
-    before make. The vent begins when the command says."""
+    """Insert the Uno's dead time: between one supply and the other, a chamber is vented for `dead_time_s` from the time
+    of the command (break before make)."""
     rows = []
     for chamber in range(3):
         before = OFF
@@ -69,10 +70,10 @@ def vented_between(commands: Timeline, dead_time_s: float) -> Timeline:
 
 
 def timeline(switches: Iterable[Sequence[float]]) -> Timeline:
-    """A timeline from rows (time_s, chamber, command) in any order; of equal times the later row wins."""
+    """Make a timeline from rows (time_s, chamber, command) in any order. At equal times the later row wins."""
     rows = np.array(list(switches), dtype=float).reshape(-1, 3)
     if not np.all(np.isfinite(rows)):
-        raise TimelineError("a switch needs a time, a chamber (0 to 2) and a command (0 to 2), all numbers")
+        raise TimelineError("a switch needs a time, a chamber (0 to 2) and a command (0 to 2), all finite numbers")
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     chamber, command = rows[:, 1].astype(np.int64), rows[:, 2].astype(np.int64)
     if np.any((chamber < 0) | (chamber > 2) | (command < 0) | (command > 2)):
@@ -81,22 +82,23 @@ def timeline(switches: Iterable[Sequence[float]]) -> Timeline:
 
 
 def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0) -> Timeline:
-    """Settled switching: phases a constant psi apart from time 0 on, the body at `first_phase_rad`."""
+    """Switches of a settled gait: the phases differ by constant psi from time 0, where the body is at
+    `first_phase_rad`."""
     return gait_switches(gait_rows([gait]), np.array([duration_s], dtype=float), float(first_phase_rad))[0]
 
 
 def of_phases(
     gait: Gait, duration_s: float, initial_rad: ArrayLike, coupling_per_s: float = cpg.COUPLING_PER_S
 ) -> Timeline:
-    """Switching of eq. (9) integrated from three initial phases, at the robot's 1 kHz."""
+    """Switches from eq. (9), integrated from three initial phases at the robot's 1 kHz."""
     time = np.arange(0.0, duration_s + 0.5 * _RESOLUTION_S, _RESOLUTION_S)
     phases = cpg.phases(gait, time, initial_rad, coupling_per_s)
     return of_samples(time, cpg.outputs(phases, gait).T)
 
 
 def of_samples(time_s: np.ndarray, columns: np.ndarray) -> Timeline:
-    """A timeline from recorded commands: `columns` (3, n) of body, head, tail; 1, 0, and NaN for off. A switch is
-    put where the new command is first seen. `refine` places it better where the gait is known."""
+    """Make a timeline from recorded commands: `columns` (3, n) of body, head, tail; 1, 0, and NaN for off. Each switch
+    is at the first sample with the new command; `refine` places it more exactly if the gait is known."""
     rows = []
     for chamber, column in enumerate(np.asarray(columns, dtype=float)):
         state = np.where(np.isnan(column), OFF, column)
@@ -106,11 +108,11 @@ def of_samples(time_s: np.ndarray, columns: np.ndarray) -> Timeline:
 
 
 def refine(recorded: Timeline, gait: Gait, sample_s: float) -> Timeline:
-    """Place switches of a 100 Hz record to well under a sample by the gait that made them.
+    """Locate the switches of a 100 Hz record to well under a sample, given the gait that produced them.
 
-    A record shows a switch up to `sample_s` late. The gait's settled times, with start and clock fitted to all the
-    intervals in which switches were seen, are used wherever they fall into those intervals (with half a sample to
-    spare); other switches (a start, a transient) are put in the middle of theirs.
+    A record shows a switch up to `sample_s` late. The gait's settled times, with start and clock rate fitted to all the
+    intervals in which switches were seen, are used where they fall into those intervals (with half a sample to spare).
+    Other switches (at the start, in a transient) are placed at the middle of their intervals.
     """
     offsets, duty = cpg.phase_offsets_rad(gait), cpg.duties(gait)
     target = np.where(recorded.command == POSITIVE, duty[recorded.chamber], 0.0)
@@ -134,7 +136,7 @@ def refine(recorded: Timeline, gait: Gait, sample_s: float) -> Timeline:
 
 
 def _fit_line(x: np.ndarray, y: np.ndarray, spread: float) -> tuple[float, float]:
-    """Slope and start of the line through most points: those off by more than `spread` are left out in turn."""
+    """Slope and intercept of a robust line fit, repeated without the points that are off by more than `spread`."""
     kept = np.ones(x.size, dtype=bool)
     slope, start = 1.0, float(np.median(y - x))
     for _ in range(5):
@@ -145,20 +147,20 @@ def _fit_line(x: np.ndarray, y: np.ndarray, spread: float) -> tuple[float, float
 
 
 def recorded_commands(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(3, n) of a walk's `command_body`, `command_head`, `command_tail`."""
+    """Stack a walk's `command_body`, `command_head` and `command_tail`, shape (3, n)."""
     return np.array([columns[f"command_{chamber}"] for chamber in cpg.CHAMBERS], dtype=float)
 
 
 def gait_switches(
     gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: float = 0.0, dead_time_s: float = 0.0
 ) -> list[Timeline]:
-    """The timelines of settled gaits, rows (period, psi12, psi13 in degrees, three duties), for as long each; between
-    the supplies chambers are vented as `vented_between` has it."""
+    """Timelines of settled gaits, given as rows (period, psi12, psi13 in degrees, three duties), each for its duration
+    in `duration_s`. Chambers are vented between the supplies as in `vented_between`."""
     period, duty = gaits[:, :1], gaits[:, 3:]
     phase = first_phase_rad / _TWO_PI + np.pad(gaits[:, 1:3], ((0, 0), (1, 0))) / 360.0
     phase = phase - np.floor(phase)
     always, never = duty <= 0.0, duty >= 1.0
-    first = np.where(always | never, always, phase >= duty)  # (n, 3): positive from time 0 on, a switch at 0 included
+    first = np.where(always | never, always, phase >= duty)  # (n, 3): positive at time 0, after any switch at 0
     cycles = int(np.max(duration_s / gaits[:, 0])) + 3
     edge = np.stack([np.zeros_like(duty), duty], axis=-1)[:, :, None, :]
     time = (np.arange(cycles)[None, None, :, None] + edge - phase[:, :, None, None]) * period[:, :, None, None]
@@ -180,7 +182,8 @@ def gait_switches(
 
 @kernel
 def delayed(plant: Any, times: Any, chamber: Any, command: Any) -> Any:
-    """When the valves switch, and the order in which they do. An edge that a later command overtakes ends with it."""
+    """When the valves switch, including delays, and the order in which they do. A switch never takes effect after a
+    later one of the same chamber."""
     late = times.copy()
     if plant.active & chains.DELAY:
         next_s = np.full(3, np.inf)

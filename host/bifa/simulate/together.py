@@ -1,4 +1,4 @@
-"""What lanes that march side by side agree on (`bifa.simulate.lanes`). In one lane alone each is the value itself."""
+"""Reductions over lanes (`bifa.simulate.lanes`). With a single lane, each returns its argument."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from bifa.simulate.compiled import merged
 
 @merged
 def worst(run, value):
-    """The greatest among the lanes that share their steps."""
+    """The greatest value among the lanes that share their steps."""
     return value
 
 
 @merged
 def least(run, value):
-    """The smallest among them."""
+    """The smallest value among the lanes that share their steps."""
     return value
 
 
 @merged
 def anyone(run, condition):
-    """Whether it holds in one of them."""
+    """Whether the condition holds in any of the lanes that share their steps."""
     return condition
 
 
 @merged
 def anywhere(condition):
-    """Whether it holds in a lane, sharing or not."""
+    """Whether the condition holds in any lane, whether or not lanes share their steps."""
     return condition

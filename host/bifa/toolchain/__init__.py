@@ -1,4 +1,4 @@
-"""The tools around the firmware, as the host uses them: PlatformIO, the built image, the board's port."""
+"""The host's use of the firmware tools: PlatformIO, the built image, the board's port."""
 
 from bifa.toolchain.flash import build_image, choose_port, upload_image, write_with_avrdude
 from bifa.toolchain.project import ToolchainError, find_project, project_folder

@@ -1,4 +1,4 @@
-"""What `bifa doctor` looks at: each check says what was found, and how to get what is missing."""
+"""The checks of `bifa doctor`: each reports what was found, and how to get what is missing."""
 
 import importlib.metadata
 import json
@@ -24,7 +24,7 @@ OPTIONAL_TOOLS = {"clang-format": "make lint", "cppcheck": "make lint", "clang++
 
 @dataclass(frozen=True)
 class Check:
-    """state: "ok", "missing" (something will not work) or "optional" (something that not everybody needs)."""
+    """Result of a check. state: "ok", "missing" (something will not work) or "optional" (not everybody needs it)."""
 
     what: str
     state: str
@@ -33,7 +33,7 @@ class Check:
 
 
 def run_checks(port: str | None) -> Iterator[Check]:
-    """Make every check; the board's last, because opening its port resets it."""
+    """Run all checks; the board's comes last, because opening its port resets it."""
     yield Check("bifa", OK, f"bifa {__version__}, Python {sys.version.split()[0]}")
     if find_project() is not None:
         yield guarded("PlatformIO", _platformio)
@@ -53,7 +53,7 @@ def run_checks(port: str | None) -> Iterator[Check]:
 
 
 def guarded(what: str, check: Callable[[str], Check]) -> Check:
-    """An expected error is a finding as well: its text says what to do."""
+    """Run `check`, turning an expected error into a result whose remedy is the error's text."""
     try:
         return check(what)
     except BifaError as error:
@@ -74,7 +74,7 @@ def check_packages(what: str) -> Check:
     except (OSError, ValueError, KeyError):
         return Check(what, OPTIONAL, "not provisioned", "run `make setup`, or let PlatformIO download them")
     if source == "stand-ins" and not shutil.which("avr-gcc"):
-        return Check(what, MISSING, "avr-gcc is gone", "sudo apt-get install gcc-avr avr-libc binutils-avr")
+        return Check(what, MISSING, "avr-gcc is missing", "sudo apt-get install gcc-avr avr-libc binutils-avr")
     return Check(what, OK, {"registry": "from its registry"}.get(source, "stand-ins from PyPI and Debian"))
 
 
@@ -90,7 +90,7 @@ def check_image(what: str) -> Check:
 
 
 def _carried(what: str) -> Check:
-    return Check(what, OK, f"version {image_of(carried_image()).version}, carried by this installation")
+    return Check(what, OK, f"version {image_of(carried_image()).version}, part of this installation")
 
 
 def _virtual_rig(what: str) -> Check:
@@ -98,7 +98,7 @@ def _virtual_rig(what: str) -> Check:
         return Check(what, OPTIONAL, "not installed", "run `make setup`, or pip install -e host/virtual_robot")
     try:
         open_rig("virtual").close()
-    except Exception as error:  # a rig of another package: whatever it raises is the finding
+    except Exception as error:  # a rig from another package may raise anything
         return Check(what, MISSING, "does not start", str(error))
     return Check(what, OK, "starts, and the image runs in it")
 
@@ -112,9 +112,9 @@ def _ports(what: str) -> Check:
 
 
 def check_board(what: str, port: str | None) -> Check:
-    """Ask the board who it is; only where a port is named or an Uno is plugged in."""
+    """Ask the board for its identity, if a port is named or an Uno is plugged in."""
     if port is None and not any(candidate.board for candidate in serial_ports()):
-        return Check(what, OPTIONAL, "no board to ask", "plug the Uno in, or name its port: --port")
+        return Check(what, OPTIONAL, "no board found", "plug the Uno in, or name its port: --port")
     with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
         hello = uno.connect()
     ours = f"protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}"

@@ -1,5 +1,5 @@
-"""Build the image and write it to the board, through PlatformIO; or write the package's image with avrdude alone: no
-checkout, no PlatformIO, no compiler. What these tools say when they fail becomes a sentence."""
+"""Build the image and write it to the board through PlatformIO, or write the package's image with avrdude alone, which
+needs no checkout, PlatformIO or compiler. Failures of these tools are explained in one sentence."""
 
 import re
 import shutil
@@ -17,14 +17,14 @@ from bifa.rig.unopened import why_unopened
 from bifa.toolchain.project import ENVIRONMENT, ToolchainError, image_path, platformio_program
 
 BAUD = "115200"  # of optiboot, the Uno's bootloader
-INSTALL = {  # avrdude, by the system
-    "linux": "sudo apt-get install avrdude (or the like of your distribution)",
+INSTALL = {  # how to install avrdude, by operating system
+    "linux": "sudo apt-get install avrdude (or your distribution's equivalent)",
     "darwin": "brew install avrdude",
     "win32": "winget install AVRDudes.AVRDUDE, then open a new terminal",
 }
 LINES_KEPT = 12
 
-# What PlatformIO, avrdude or the system say -> what to do about it; `{port}` is filled in.
+# Pattern in the output of PlatformIO, avrdude or the system, and what to do about it; `{port}` is filled in.
 REMEDIES = (
     (r"not in sync|not responding", "no bootloader answers on {port}: is it the Uno? Close other programs that use "
      "the port, press its reset button just as the upload begins, or try another cable"),
@@ -35,7 +35,8 @@ REMEDIES = (
 
 
 def choose_port(port: str | None) -> str:
-    """Return the port to write to: the one named, or the only Uno there is; it must open."""
+    """Return the port to write to: the given one or that of the only Uno. Raises ToolchainError if it does not
+    open."""
     if port is None:
         port = find_port()
     try:
@@ -58,7 +59,7 @@ def upload_image(project: Path, port: str, on_line: Callable[[str], None]) -> No
 
 
 def avrdude_program() -> Path:
-    """Return avrdude on PATH."""
+    """Return the path of avrdude. Raises ToolchainError if it is not installed."""
     found = shutil.which("avrdude")
     if not found:
         raise ToolchainError(f"avrdude, which writes to the board, is not installed: {INSTALL.get(sys.platform, '')}")
@@ -68,7 +69,7 @@ def avrdude_program() -> Path:
 def write_with_avrdude(image: Path, port: str, on_line: Callable[[str], None]) -> None:
     """Write `image` to the Uno at `port` and verify it; avrdude resets the board."""
     chip = ["-p", "atmega328p", "-c", "arduino", "-P", port, "-b", BAUD, "-D"]
-    # By its name alone: in `flash:w:FILE:i` a colon parts the fields, and a path of Windows has one.
+    # By its bare name: in `flash:w:FILE:i` colons separate the fields, and Windows paths contain one.
     _run("avrdude", [avrdude_program(), *chip, "-U", f"flash:w:{image.name}:i"], image.parent, port, on_line)
 
 

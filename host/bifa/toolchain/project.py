@@ -1,4 +1,4 @@
-"""Where the project, its image and PlatformIO are."""
+"""Locate the project, its image and PlatformIO."""
 
 import shutil
 import sys
@@ -11,11 +11,11 @@ ENVIRONMENT = "uno"
 
 
 class ToolchainError(BifaError):
-    """A tool is missing, a build failed, or the board could not be written; it says what to do."""
+    """A tool is missing, a build failed, or the board could not be written; the text says what to do."""
 
 
 def find_project() -> Path | None:
-    """Return the clone this package belongs to, else the one around the working directory, if there is one."""
+    """Return the clone that this package belongs to, or else the one around the working directory, if any."""
     here = Path.cwd()
     for folder in (Path(bifa.__file__).resolve().parents[2], here, *here.parents):
         if (folder / "platformio.ini").is_file() and (folder / "firmware").is_dir():
@@ -24,14 +24,15 @@ def find_project() -> Path | None:
 
 
 def project_folder() -> Path:
-    """Return the clone, which must be there."""
+    """Return the clone. Raises ToolchainError if there is none."""
     if folder := find_project():
         return folder
     raise ToolchainError("no platformio.ini and firmware/ here; run this in a clone of the repository")
 
 
 def platformio_program() -> Path:
-    """Return PlatformIO's command: the one of this Python environment, else the one on PATH."""
+    """Return PlatformIO's command: from this Python environment or else from PATH. Raises ToolchainError if there is
+    none."""
     found = shutil.which("pio", path=str(Path(sys.executable).parent)) or shutil.which("pio")
     if not found:
         raise ToolchainError("PlatformIO is not installed; run `make setup`, or `pip install platformio`")
@@ -39,5 +40,5 @@ def platformio_program() -> Path:
 
 
 def image_path(project: Path) -> Path:
-    """Return where PlatformIO puts the image for the Uno (which need not exist)."""
+    """Return the path where PlatformIO puts the image for the Uno, which need not exist."""
     return project / ".pio" / "build" / ENVIRONMENT / "firmware.elf"

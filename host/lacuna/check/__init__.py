@@ -1,4 +1,4 @@
-"""Rejects misleading input before the search, naming the trial and the channel."""
+"""Checks that reject misleading input before the search, naming the trial and the channel."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from lacuna.system import System
 
 
 def check(system: System) -> tuple[str, ...]:
-    """Reject what cannot be diagnosed; return warnings, one sentence each, about what needs care. Costs a few
-    simulations of every trial. Raises MisuseError."""
+    """Raise MisuseError if the system cannot be diagnosed; return warnings about what needs care, one text each. Costs
+    a few simulations of every trial."""
     trials = tuple(system.trials)
     check_names(system, trials)
     for trial in trials:

@@ -1,4 +1,4 @@
-"""Parameters that act in steps, as a delay that counts whole samples does: within one, no prediction changes."""
+"""Parameters that act in steps, such as a delay counted in whole samples: within a step, no prediction changes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from lacuna.check.model import initial, sought
 from lacuna.check.numbers import differ
 from lacuna.system import Channels, Parameter, Record, System, Theta
 
-_SMALL = 0.02  # of a parameter's scale: a step that derivatives take; what changes nothing by it acts in larger ones
-_DOUBLED, _HALVED = 10, 14  # times, to find an edge between two steps
+_SMALL = 0.02  # of a parameter's scale: a derivative's step; if it changes nothing, the parameter acts in larger ones
+_DOUBLED, _HALVED = 10, 14  # number of doublings and bisections of the interval when locating an edge between steps
 
 Predict = Callable[[float], Channels]
 
 
 def grains_of(system: System, trials: Sequence[Record]) -> dict[str, float]:
-    """By the full name of each parameter that acts in steps, the width of one, as it is fitted, effects at their
-    typical sizes. Costs three simulations of a trial for each of the other parameters."""
+    """Width of a step of each parameter that acts in steps, by its full name, in the parameter's fitted units and with
+    effects at their typical sizes. Costs three simulations of a trial for each of the other parameters."""
     start = initial(system)
     widths = {p.name: _width(system, start, p.name, p, (), trials) for p in system.parameters}
     for effect in system.effects.values():
@@ -30,7 +30,7 @@ def grains_of(system: System, trials: Sequence[Record]) -> dict[str, float]:
 def _width(
     system: System, theta: Theta, name: str, parameter: Parameter, effects: tuple[str, ...], trials: Sequence[Record]
 ) -> float:
-    """From one edge to the next, in the first trial in which there are two; 0 where a small step changes something."""
+    """Distance between adjacent edges, in the first trial that has two; 0 if small changes affect a prediction."""
     small = _SMALL * parameter.step_scale
     small = small if parameter.value + 2.0**_DOUBLED * small <= parameter.upper else -small
     for trial in trials:
@@ -38,7 +38,7 @@ def _width(
         def predict(value: float, trial: Record = trial) -> Channels:
             return sought(system, {**theta, name: value}, effects, trial)
 
-        # An initial value may lie right before an edge, as numbers that are whole in samples do.
+        # An initial value that is a whole number of samples may lie right before an edge.
         first, second, third = (predict(parameter.value + k * small) for k in range(3))
         if _changes(first, second) and _changes(second, third):
             return 0.0
@@ -50,7 +50,7 @@ def _width(
 
 
 def _edge(predict: Predict, parameter: Parameter, begin: float, small: float) -> float | None:
-    """The nearest value beyond `begin` at which predictions are others; None where there is none within the bounds."""
+    """The nearest value beyond `begin` at which predictions change; None if there is none within the bounds."""
     here, within, step = predict(begin), begin, small
     for _ in range(_DOUBLED):
         beyond = begin + step

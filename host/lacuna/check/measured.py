@@ -1,4 +1,4 @@
-"""Records that cannot be compared with a prediction."""
+"""Checks of records for data that cannot be compared with a prediction."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def check_record(trial: Record) -> None:
 
 
 def check_columns(trials: Sequence[Record]) -> None:
-    """An input that has a value for each sample in one trial has one in every trial. Raises MisuseError."""
+    """Raise MisuseError if an input that is sampled like the times in one trial has another length in some trial."""
     sampled = {n for t in trials for n, column in t.inputs.items() if np.shape(column) == t.time_s.shape}
     for trial in trials:
         for name, column in trial.inputs.items():
@@ -49,14 +49,15 @@ def check_columns(trials: Sequence[Record]) -> None:
 
 
 def gaps_in_inputs(trials: Sequence[Record]) -> Iterable[str]:
-    """A missing sample of an output is left out of the comparison; without one of an input a model may not go on."""
+    """Warn of missing samples in inputs: a missing output sample is merely left out of the comparison, but without an
+    input sample the model may be unable to continue."""
     for trial in trials:
         for name, column in trial.inputs.items():
             column = np.asarray(column)
             if column.dtype.kind == "f" and not np.isfinite(column).all():
                 at = f" at sample {first(~np.isfinite(column))}" if column.ndim else ""
                 where = f"Trial {trial.name}, input {name}"
-                yield f"{where}: no number{at}; a model that uses it cannot predict from there on."
+                yield f"{where}: no number{at}; a model that uses this input cannot predict from there on."
 
 
 def check_constant(trials: Sequence[Record]) -> None:

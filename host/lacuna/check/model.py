@@ -1,4 +1,4 @@
-"""Models that cannot be fitted: what they return, raise, ignore or remember."""
+"""Checks of models that cannot be fitted, by what they return, raise, ignore or remember."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.records import Stretch
 from lacuna.system import Channels, Record, System, Theta
 
-_NEUTRAL = 1e-3  # of a channel's spread, RMS: largest change by an effect at the size at which it is absent
-_ELSEWHERE = 0.03  # the same in an experiment where it need not be looked for, since it hardly acts
-_NEAR_ABSENT = 0.1  # of its typical size: how near the absent one an effect may come at least
+_NEUTRAL = 1e-3  # of a channel's spread, RMS: largest permitted change by an effect at its absent size
+_ELSEWHERE = 0.03  # the same for an effect of typical size in an experiment outside its `experiments`
+_NEAR_ABSENT = 0.1  # of its typical size: an effect's bounds must let it come this close to its absent size
 
 
 def initial(system: System) -> dict[str, float]:
@@ -23,8 +23,8 @@ def initial(system: System) -> dict[str, float]:
 
 
 def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Channels], tuple[str, ...]]:
-    """What the model predicts with its initial values, by the names of the trials that it can predict, and warnings.
-    Raises MisuseError."""
+    """Check the model. Returns its predictions at the initial values, by the names of the trials that it can predict,
+    and warnings. Raises MisuseError."""
     start = initial(system)
     predictions = {t.name: predicted(system, start, (), t) for t in trials}
     failed = [t.name for t in trials if _failing(t, predictions[t.name]) is not None]
@@ -58,7 +58,7 @@ def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Cha
 
 
 def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
-    """A prediction, checked. Raises MisuseError."""
+    """A prediction of a trial at its nuisances' expected values, checked. Raises MisuseError."""
     theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
     with_effects = f" with effect {effects[0]}" if effects else ""
     try:
@@ -94,19 +94,20 @@ def _check_deterministic(system: System, start: Theta, trial: Record, prediction
 
 
 def _check_free_run(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
-    """What was measured of a channel late, where no initial state is taken from, changes no prediction of it."""
+    """Raise MisuseError if late measured samples of a channel, which cannot serve for an initial state, change its
+    prediction."""
     theta = dict(start) | {p.name: p.value for p in system.nuisances(trial)}
     for name, measured in trial.channels.items():
         (found,) = system.predict_trials([theta], (), [_measured_otherwise(trial, name)])
         if differ(found[name], predictions[trial.name][name], SAME * spread(measured)):
             raise MisuseError(
-                f"trial {trial.name}, channel {name}: the prediction follows what was measured, so that nothing would"
-                " seem to be missing. Let the model run freely, from its initial state and its inputs."
+                f"trial {trial.name}, channel {name}: the prediction depends on the measured samples, which would hide"
+                " anything missing. Let the model run freely, from its initial state and its inputs."
             )
 
 
 def _measured_otherwise(trial: Record, name: str) -> Record:
-    """`trial` with other measured samples of a channel in its second half, and the run that it is a stretch of too."""
+    """`trial` with altered samples of a channel in its second half, also in the run that it is a stretch of, if any."""
     measured, late = trial.channels[name], np.arange(len(trial.time_s)) >= len(trial.time_s) // 2
     otherwise = (measured + late * (1.0 + spread(measured))).astype(measured.dtype)
     stretch = trial.payload
@@ -116,8 +117,8 @@ def _measured_otherwise(trial: Record, name: str) -> Record:
 
 
 def _check_effects(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> None:
-    """An effect at the size at which it is absent leaves the base model's prediction unchanged, and at its typical size
-    hardly changes it in other experiments than its own."""
+    """Raise MisuseError if an effect at its absent size changes the base model's prediction, or at its typical size
+    changes it noticeably in an experiment outside its `experiments`."""
     firsts = {t.experiment: t for t in reversed(trials)}
     for name, effect in system.effects.items():
         off = effect.typical | dict.fromkeys(effect.size_names, effect.absent)
@@ -126,7 +127,7 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
                 theta, share, why = off, _NEUTRAL, f"its size is {effect.absent:g}, at which it is declared absent."
             else:
                 theta, share = effect.typical, _ELSEWHERE
-                why = f"{trial.experiment} is none of its `experiments`: name that one, too."
+                why = f"{trial.experiment} is not among its `experiments`: add it."
             found = predicted(system, dict(start) | theta, (name,), trial)
             if channel := changed(found, predictions[trial.name], trial, share):
                 raise MisuseError(
@@ -135,8 +136,8 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
 
 
 def _never_off(system: System) -> list[str]:
-    """Effects whose bounds keep them away from the size at which they are absent: what a factor is, if it is not said
-    that it is absent at 1."""
+    """Warnings of effects whose bounds keep them away from their absent size, for example a factor that was not
+    declared absent at 1."""
     found = []
     for effect in system.effects.values():
         for p in effect.parameters[: effect.sizes]:
@@ -145,14 +146,15 @@ def _never_off(system: System) -> list[str]:
                 name = effect.full_name(p)
                 absent, *bounds = (system.told(name, value) for value in (effect.absent, p.lower, p.upper))
                 found.append(
-                    f"Effect {effect.name} is absent where its {p.name} is {absent:g}, which the bounds {min(bounds):g}"
-                    f" and {max(bounds):g} do not let it come near: is it absent elsewhere (a factor: absent=1)?"
+                    f"Effect {effect.name} is declared absent when its {p.name} is {absent:g}, but the bounds"
+                    f" {min(bounds):g} to {max(bounds):g} keep it away from there. If another value makes it absent,"
+                    " declare that (for a factor: absent=1)."
                 )
     return found
 
 
 def _unused(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> list[str]:
-    """Effects that change no prediction, at none of the sizes that fits begin at."""
+    """Warnings of effects that change no prediction at any of the sizes at which fits start."""
     found = []
     for name, effect in system.effects.items():
         sizes = [
@@ -169,14 +171,15 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
             for size in sizes
         ):
             found.append(
-                f"Effect {name} changes no prediction, at none of its sizes that fits begin at: does the model use it,"
-                " and do these records reach it?"
+                f"Effect {name} changes no prediction at any of its start sizes: does the model use it, and do these"
+                " records excite it?"
             )
     return found
 
 
 def sought(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
-    """A prediction as a search makes it, far from what is known: where there is none, that is a change."""
+    """An unchecked prediction, as the search makes it, for parameters that may be far from the initial ones; a failed
+    one (NaN) counts as a change."""
     theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
     return system.predict_trials([theta], effects, [trial])[0]
 
@@ -194,5 +197,5 @@ def _idle(system: System, start: Theta, trials: Sequence[Record], predictions: M
 
 
 def _failing(trial: Record, prediction: Channels) -> str | None:
-    """The first channel whose prediction is missing where it was measured."""
+    """The first channel whose prediction is missing at a measured sample, or None."""
     return next((c for c, p in prediction.items() if not np.isfinite(p[np.isfinite(trial.channels[c])]).all()), None)

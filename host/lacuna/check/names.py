@@ -1,4 +1,4 @@
-"""Names that lead nowhere, or to two things."""
+"""Checks of names: undefined, inconsistent or ambiguous ones are rejected."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ def check_names(system: System, trials: Sequence[Record]) -> None:
             raise MisuseError(f"effect {effect.name} is listed under the key {key}: use its name as the key.")
         for site in effect.freed_at:
             if site not in system.correction_sites:
-                raise MisuseError(f"effect {effect.name} is freed at {site}, which is no correction site.")
-        for parameter in system.parameters:  # one that is known is not among them
+                raise MisuseError(f"effect {effect.name} is freed at {site}, which is not a correction site.")
+        for parameter in system.parameters:  # those with known values are not among them
             if parameter.name in effect.apart and parameter.at_least is None:
                 raise MisuseError(
-                    f"effect {effect.name} needs {parameter.name} apart, which lacks `at_least`: apart from what?"
+                    f"effect {effect.name} declares {parameter.name} in `apart`, but that parameter has no `at_least`"
+                    " to be kept apart from."
                 )
     effects = [e.full_name(p) for e in system.effects.values() for p in (*e.parameters, *e.own)]
     for name in _repeated([p.name for p in system.parameters] + effects):

@@ -1,4 +1,4 @@
-"""Comparing columns, and saying where; and how noisy one is."""
+"""Helpers that compare columns, name places, and estimate noise."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 from lacuna.system import Channels, Record
 
-SAME = 1e-9  # of a channel's spread: what differs by less does not differ
+SAME = 1e-9  # relative to a channel's spread: smaller differences count as none
 
 
 def spread(column: np.ndarray) -> float:
-    """Standard deviation of what was measured."""
+    """Standard deviation of the measured samples."""
     return float(np.nanstd(np.asarray(column, float)))
 
 
 def differ(a: np.ndarray, b: np.ndarray, limit: float) -> bool:
-    """Whether two columns differ by more than `limit` (RMS), or in where they have a value at all."""
+    """Whether two columns differ by more than `limit` (RMS), or in which samples are missing."""
     if (np.isfinite(a) != np.isfinite(b)).any():
         return True
     known = np.isfinite(a)
@@ -25,25 +25,25 @@ def differ(a: np.ndarray, b: np.ndarray, limit: float) -> bool:
 
 
 def changed(found: Channels, before: Channels, trial: Record, share: float) -> str | None:
-    """The first channel that is predicted differently, by more than that share of its spread."""
+    """The first channel whose predictions differ by more than the given share of its measured spread, or None."""
     return next(
         (c for c, measured in trial.channels.items() if differ(found[c], before[c], share * spread(measured))), None
     )
 
 
 def first(true: np.ndarray) -> int:
-    """Index of the first that is true."""
+    """Index of the first true element."""
     return int(np.flatnonzero(true)[0])
 
 
 def within(experiment: str, experiments: Iterable[str]) -> str:
-    """Where something is, unless there is only one place."""
+    """The phrase " in {experiment}", or nothing if there is only one experiment."""
     return f" in {experiment}" if len(set(experiments)) > 1 else ""
 
 
 def fast_noise(time_s: np.ndarray, samples: np.ndarray) -> float:
-    """Standard deviation of white noise in a smooth record, from how far each sample is off the line through its
-    neighbours; robust against jumps."""
+    """Standard deviation of white noise in a smooth record, from the distance of each sample to the line through its
+    neighbours; robust against jumps. 0 with fewer than three samples."""
     known = np.isfinite(samples)
     at, seen = time_s[known], samples[known]
     if len(seen) < 3:

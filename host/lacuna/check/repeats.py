@@ -1,4 +1,4 @@
-"""Repeats that are none: their differences become the noise floor."""
+"""Checks of repeats that are not true repeats, since their differences become the noise floor."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from lacuna.check.numbers import SAME, changed, fast_noise, spread
 from lacuna.errors import MisuseError, listed
 from lacuna.system import Channels, Record, System, by_channel, groups_of_repeats
 
-_OTHER = 0.5  # of an input's spread, RMS: repeats must differ by less
-_GOOD_PART = 0.25  # of a channel's spread, RMS, that repeats differ by
-_FAR_MORE = 20.0  # times their own fast noise
-_UNLIKE = 10.0  # times what repeats differ by as a rule, RMS: one that is as far from all others was recorded otherwise
+_OTHER = 0.5  # of an input's spread: inputs of repeats must differ by less, RMS
+_GOOD_PART = 0.25  # of a channel's spread: RMS difference between repeats that is suspicious,
+_FAR_MORE = 20.0  # if it is also this many times their own fast noise
+_UNLIKE = 10.0  # times the usual RMS difference between repeats: a repeat this far from all others is suspect
 
 
 def check_times(trials: Sequence[Record]) -> None:
-    """Repeats are compared at equal times. Raises MisuseError."""
+    """Raise MisuseError if the times of repeats hardly overlap, since repeats are compared at equal times."""
     for first, *others in groups_of_repeats(trials):
         for other in others:
             (a, b), (c, d) = ((float(t.time_s[0]), float(t.time_s[-1])) for t in (first, other))
             if min(b, d) - max(a, c) < 0.5 * min(b - a, d - c):
                 raise MisuseError(
-                    f"{_declared(first, other)}, but one is from {a:g} to {b:g} s and the other from {c:g} to {d:g} s:"
+                    f"{_declared(first, other)}, but one spans {a:g} to {b:g} s and the other {c:g} to {d:g} s:"
                     " count the times of each from its own start."
                 )
 
 
 def check_inputs(system: System, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> Iterator[str]:
-    """Repeats have the same inputs, as far as these change what is predicted: raises MisuseError. Warns of columns that
-    do not. `predictions`: with the initial values, of the trials that can be predicted."""
+    """Raise MisuseError if the inputs of repeats differ in a way that changes the prediction; warn of input columns
+    that differ without doing so. `predictions`: at the initial values, of the trials that can be predicted."""
     ignored: dict[str, str] = {}
     for first, other, name, its, said in _differences([t for t in trials if t.name in predictions]):
         there = replace(first, inputs={**first.inputs, name: its})
@@ -42,20 +42,21 @@ def check_inputs(system: System, trials: Sequence[Record], predictions: Mapping[
         found, share = predicted(system, initial(system), (), there), SAME if of_column else _OTHER
         if channel := changed(found, predictions[first.name], first, share):
             raise MisuseError(
-                f"{_declared(first, other)}, but {said}, with which {channel} is predicted differently: the difference"
-                " would pass for noise. Give them different conditions."
+                f"{_declared(first, other)}, but {said}, which changes the prediction of {channel}: the difference"
+                " would be taken for noise. Give them different conditions."
             )
         if of_column:
             ignored.setdefault(name, f"{first.name} and {other.name}")
     for name, pair in ignored.items():
         yield (
-            f"The repeats {pair} have a different {name}, which the base model does not use: what it does to them"
-            " passes for noise."
+            f"The repeats {pair} have a different {name}, which the base model does not use: its influence on them is"
+            " taken for noise."
         )
 
 
 def _differences(trials: Sequence[Record]) -> Iterator[tuple[Record, Record, str, Any, str]]:
-    """Two repeats, the name of an input that differs, what the first would have as the second's, and this in words."""
+    """Pairs of repeats with the name of an input that differs, the second's values on the first's time base, and a
+    description."""
     spreads = {name: _input_spread(trials, name) for name in {name for trial in trials for name in trial.inputs}}
     for first, *others in groups_of_repeats(trials):
         for other, name in product(others, sorted(first.inputs)):
@@ -69,12 +70,12 @@ def _differences(trials: Sequence[Record]) -> Iterator[tuple[Record, Record, str
 
 
 def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
-    """Warnings of repeats that are copies, or unlike all others."""
+    """Warn of repeats that are copies of one another, or unlike all others."""
     groups = [group for group in groups_of_repeats(trials) if len(group) > 1]
     for group in groups:
         for first, other in combinations(group, 2):
             if _same_columns(first.channels, other.channels):
-                yield f"Trials {first.name} and {other.name} are the same record: a copy is no repeat. Leave it out."
+                yield f"Trials {first.name} and {other.name} are identical: a copy is not a repeat. Leave one out."
     for experiment, channel in by_channel(trials):
         members = [group for group in groups if group[0].experiment == experiment]
         apart = [_apart(group, channel) for group in members]
@@ -84,8 +85,8 @@ def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
 
 
 def apart_for_no_reason(system: System, trials: Sequence[Record]) -> Iterator[str]:
-    """A warning of the worst group of repeats that differ by a good part of their range, and far more than each is
-    noisy, where nothing is declared to vary from run to run: a setting that is part of their names, say."""
+    """Warn of the worst group of repeats that differ by much of their range and far more than their own noise although
+    nothing is declared to vary from run to run. A setting that only their names tell may be the cause."""
     found = []
     for group in groups_of_repeats(trials):
         if len(group) < 2 or any(system.nuisances(trial) for trial in group):
@@ -100,13 +101,13 @@ def apart_for_no_reason(system: System, trials: Sequence[Record]) -> Iterator[st
         _, between, within, channel, group = max(found, key=lambda one: one[0])
         yield (
             f"{listed([trial.name for trial in group])} are taken for repeats, but differ in {channel} by {between:.3g}"
-            f" (RMS), where each scatters by {within:.2g}: if something was set otherwise in them, give each its own"
-            " condition. What repeats differ by is taken for noise."
+            f" (RMS), while each scatters by only {within:.2g}: if their settings differed, give each its own"
+            " condition, since what repeats differ by is taken for noise."
         )
 
 
 def not_declared(trials: Sequence[Record]) -> Iterator[str]:
-    """A warning where nothing is declared as a repeat, but inputs are the same."""
+    """Warn if no repeats are declared but two trials have the same inputs."""
     if any(len(group) > 1 for group in groups_of_repeats(trials)):
         return
     for first, other in combinations(trials, 2):
@@ -114,20 +115,20 @@ def not_declared(trials: Sequence[Record]) -> Iterator[str]:
         driven = any(np.shape(column) == first.time_s.shape for column in first.inputs.values())
         if alike and driven and first.experiment == other.experiment and _same_columns(first.inputs, other.inputs):
             yield (
-                f"Trials {first.name} and {other.name} have the same inputs, and nothing is declared as a repeat. If"
-                " they are repeats, give them one condition: the noise floor comes from repeats."
+                f"Trials {first.name} and {other.name} have the same inputs, but no repeats are declared. If they are"
+                " repeats, give them the same condition: the noise floor is estimated from repeats."
             )
             return
 
 
 def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, usual: float) -> Iterator[str]:
-    """`apart`: of a group's members, RMS, shape (n, n); `usual`: the same as a rule in the experiment's other
-    conditions; 0 without any."""
+    """Warn of members of a group unlike the others. `apart`: RMS differences between members, shape (n, n); `usual`:
+    the typical difference in the experiment's other conditions, 0 if there are none."""
     if len(group) == 2:
         if apart[0, 1] > _UNLIKE * usual > 0.0:
             yield (
                 f"Trials {group[0].name} and {group[1].name}, repeats of one condition, differ in {channel} by"
-                f" {apart[0, 1]:.3g} (RMS), others by {usual:.2g}: if one was recorded otherwise, leave it out."
+                f" {apart[0, 1]:.3g} (RMS), other pairs by {usual:.2g}: if one was recorded differently, leave it out."
             )
         return
     for k, trial in enumerate(group):
@@ -137,9 +138,9 @@ def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, usual: flo
             times_s, differs = _difference(trial, group[others[0]], channel)
             at = trial.time_s[0] + times_s[np.nanargmax(np.abs(differs))]
             yield (
-                f"Trial {trial.name}, channel {channel}: unlike its repeats, from which it differs by {nearest:.3g}"
-                f" (RMS), they from one another by {alike:.2g}; most at {at:.4g} s. If it was recorded otherwise, leave"
-                " it out: what repeats differ by is taken for noise."
+                f"Trial {trial.name}, channel {channel}: differs from its repeats by {nearest:.3g} (RMS), while these"
+                f" differ from one another by {alike:.2g}; it differs most at {at:.4g} s. If it was recorded"
+                " differently, leave it out: what repeats differ by is taken for noise."
             )
 
 
@@ -157,7 +158,7 @@ def _apart(group: Sequence[Record], channel: str) -> np.ndarray:
 
 
 def _difference(one: Record, other: Record, channel: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times from the start of `one`, and by how much it differs there, where both were measured."""
+    """Times from the start of `one`, and its difference from `other` there; NaN where either was not measured."""
     at, there = one.time_s - one.time_s[0], other.time_s - other.time_s[0]
     apart = one.channels[channel] - np.interp(at, there, other.channels[channel], right=np.nan)
     return at, apart
@@ -188,12 +189,12 @@ def _at_times_of(first: Record, other: Record, name: str) -> np.ndarray:
 
 
 def _input_spread(trials: Sequence[Record], name: str) -> float:
-    """Over all trials: a measured input may be all noise in one of them."""
+    """Spread of an input over all trials, since a measured input may be pure noise in one of them."""
     columns = [np.asarray(t.inputs[name]) for t in trials if _is_sampled(t, name)]
     return spread(np.concatenate(columns)) if columns else 0.0
 
 
 def _is_sampled(trial: Record, name: str) -> bool:
-    """Whether it has a number for each of its times under this name."""
+    """Whether the input of this name is numeric with one value for each of the trial's times."""
     column = np.asarray(trial.inputs.get(name))
     return column.shape == trial.time_s.shape and column.dtype.kind in "fiu"

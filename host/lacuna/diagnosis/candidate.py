@@ -1,4 +1,4 @@
-"""One explanation tried: the base model plus a set of effects, fitted with the same effort as every other."""
+"""A candidate explanation: the base model plus a set of effects, fitted with the same effort as every other."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 from lacuna.system import Record
 
-_CONTINUED = 1e-3  # of the cost: where a refit with fewer effects may stop
+_CONTINUED = 1e-3  # tolerance of a refit with fewer effects, relative to the cost
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """`fitted` on the trials to fit; `checked`: how it does on those that it is judged on besides (`Split.judging`)."""
+    """`fitted` on the trials to fit; `checked`: evaluated on the further trials that judge it (`Split.judging`)."""
 
     fitted: Fit
     checked: Fit
@@ -30,7 +30,7 @@ class Candidate:
 
     @property
     def judged(self) -> tuple[Fit, ...]:
-        """Fits on the trials that they were not fitted to."""
+        """Evaluations on the trials that the explanation was not fitted to."""
         return (self.checked,)
 
     @property
@@ -39,38 +39,38 @@ class Candidate:
 
     @cached_property
     def pieces_fitted(self) -> float:
-        """Independent pieces of information in the trials that it is fitted to."""
+        """Number of independent pieces of information in the trials fitted."""
         return effective_samples(self.fitted)
 
     @cached_property
     def pieces(self) -> float:
-        """The same in all that it is judged on."""
+        """Number of independent pieces of information in all trials that judge it, fitted ones included."""
         return self.pieces_fitted + effective_samples(self.checked)
 
     @property
     def rms(self) -> float:
-        """Weighted RMS residual of the known trials, in units of the noise; large ones compressed, as in the fit."""
+        """Weighted RMS residual over `trials`, in units of the noise; large residuals are compressed as in the fit."""
         return float(np.sqrt(2.0 * (self.fitted.cost + self.checked.cost) / self.pieces))
 
     @property
     def checked_cost(self) -> float:
-        """Minus log-likelihood of the trials that it was not fitted to."""
+        """Negative log-likelihood of the trials that it was not fitted to."""
         return self.checked.cost
 
     @property
     def trials(self) -> tuple[Record, ...]:
-        """All that it is judged on."""
+        """All trials that judge it, fitted ones included."""
         return (*self.fitted.problem.trials, *self.checked.problem.trials)
 
     @cached_property
     def checked_error(self) -> tuple[int, float]:
-        """How many of the trials that it was not fitted to it cannot predict at all, and the RMS residual of the
-        others, large ones at their full size."""
+        """On the trials that it was not fitted to: how many it cannot predict at all, and the RMS residual of the
+        others, without compression of large residuals."""
         return at_full_size(self.judged)
 
     @cached_property
     def cost(self) -> float:
-        """Minus log-likelihood of all known trials, plus what implausible parameters and extra ones cost."""
+        """Negative log-likelihood of `trials` plus penalties for implausible and for additional parameters."""
         system = self.fitted.structure.system
         extra = sum(len(system.effects[name].parameters) for name in self.effects)
         own = sum(len(self.fitted.structure.own(trial)) for trial in self.trials)
@@ -84,32 +84,32 @@ class Candidate:
 
     @cached_property
     def by_trial(self) -> dict[str, float]:
-        """Of each trial that it is judged on, by name, minus the log-likelihood of its residuals."""
+        """Negative log-likelihood of each of `trials`, by name."""
         return costs_by_trial([self.fitted, self.checked])
 
     @cached_property
     def unseen_by_trial(self) -> dict[str, float]:
-        """The same of those that it was not fitted to."""
+        """Negative log-likelihood of each trial that it was not fitted to, by name."""
         return costs_by_trial(self.judged)
 
     @cached_property
     def errors(self) -> dict[str, float]:
-        """Of each trial that it was not fitted to, by name, the RMS residual, large ones at their full size."""
+        """RMS residual of each trial that it was not fitted to, by name, without compression of large residuals."""
         return {trial.name: rms([z]) for trial, z in with_residuals(self.judged)}
 
     @property
     def left(self) -> float:
-        """Of the mean square on the trials that it was not fitted to, what noise at the floor would not leave."""
+        """Excess of the mean square residual over the floor on the trials that it was not fitted to."""
         return max(self.checked_error[1] ** 2 - 1.0, 0.0)
 
     @property
     def excess(self) -> float:
-        """Of the cost, what noise at the floor would not leave."""
+        """Excess of the cost over what noise at the floor would leave."""
         return max(self.cost - 0.5 * self.pieces, 0.0)
 
 
 def costs_by_trial(fits: Sequence[Fit]) -> dict[str, float]:
-    """Of each trial of these fits, by name, minus the log-likelihood of its residuals."""
+    """Negative log-likelihood of the residuals of each trial of these fits, by the trial's name."""
     return {
         trial.name: 0.5 * float(r @ r)
         for fit in fits
@@ -118,7 +118,7 @@ def costs_by_trial(fits: Sequence[Fit]) -> dict[str, float]:
 
 
 def implausibility(fitted: Fit, policy: Policy) -> float:
-    """What it costs an explanation to need parameters that no sane system has."""
+    """The penalty for parameters outside their plausible ranges."""
     total = 0.0
     for parameter in fitted.structure.parameters:
         if parameter.plausible is not None:
@@ -127,7 +127,7 @@ def implausibility(fitted: Fit, policy: Policy) -> float:
 
 
 def _outside(plausible: tuple[float, float], value: float) -> float:
-    """How far beyond the plausible range, in half ranges."""
+    """Distance of `value` from the plausible range, in half ranges."""
     lower, upper = plausible
     return max(lower - value, value - upper, 0.0) / (0.5 * (upper - lower))
 
@@ -137,7 +137,7 @@ def judge(fitted: Fit, split: Split, policy: Policy, near: Fit | None = None) ->
 
 
 def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split) -> Candidate:
-    """`candidate` with these of its effects only, and all its curves, fitted from where it stands."""
+    """`candidate` with only these of its effects and all of its curves, refitted from its current parameters."""
     parent = candidate.fitted
     kept = tuple(e for e in candidate.effects if e in effects)
     structure = Structure(parent.structure.system, kept, parent.structure.sites)
@@ -147,7 +147,8 @@ def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split)
 
 
 def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:
-    """The floor as the repeats show it once a better explanation has taken its share of what differs between runs."""
+    """The floor lowered to what repeats' residuals differ by under `candidate`, since a better explanation also removes
+    part of the differences between runs."""
     residuals = candidate.fitted.residuals() | candidate.checked.residuals()
     system = candidate.fitted.structure.system
     return floor.lowered_by(estimate_noise(system, split.known, residuals))

@@ -1,4 +1,4 @@
-"""One data set under diagnosis: its split, its base fit, and every explanation refitted and tested at most once."""
+"""One data set under diagnosis: its split, its base fit, and cached refits and tests of every explanation."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import intervals
 from lacuna.system import System
 
-_ROUGH, _FINE = 1e-3, 1e-4  # of the cost: where a fit may stop that another follows, and one that is reported
-_HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much away,
-_DOUBTFUL = 1.5  # and no last digits of it so much
-_ASTRAY = 1.1  # times the error on conditions never fitted
-_FITS = ("on_known", "settled", "intervals", "converged")  # questions whose answers no rule of decision changes
+_ROUGH, _FINE = 1e-3, 1e-4  # relative to the cost: tolerances of an intermediate fit and of a reported one
+_HOPELESS = 5.0  # times the relevance threshold: no refit to a few more trials brings a larger remainder below it,
+_DOUBTFUL = 1.5  # and no iterations from a nearly converged fit bring down one beyond this
+_ASTRAY = 1.1  # ratio of errors on conditions never fitted beyond which plain least squares is rejected
+_FITS = ("on_known", "settled", "intervals", "converged")  # methods whose results do not depend on the policy
 
 Answer = TypeVar("Answer")
 
 
 def _once(ask: Callable[[Case, Candidate], Answer]) -> Callable[[Case, Candidate], Answer]:
-    """A question about a candidate, which is answered once."""
+    """Cache a method's result for each candidate."""
 
     @wraps(ask)
     def answered(self: Case, candidate: Candidate) -> Answer:
@@ -65,22 +65,22 @@ def _once(ask: Callable[[Case, Candidate], Answer]) -> Callable[[Case, Candidate
 
 
 class Case:
-    """Answers what the search and the verdict ask about a candidate, each refit and each test made once."""
+    """The refits and tests of candidates that the search and the verdict need, each made once and cached."""
 
     def __init__(self, system: System, split: Split, policy: Policy, seed: int, suspected: Collection[str] = ()):
         self.system, self.split, self.policy, self.seed, self.suspected = system, split, policy, seed, suspected
-        self.by_turns: dict[Candidate, Candidate] = {}  # without repeats: as they predict each record from the others
+        self.by_turns: dict[Candidate, Candidate] = {}  # without repeats: each candidate's cross-validated form
         self._answers: dict[tuple[str, Candidate], Any] = {}
 
     def ruled_by(self, policy: Policy) -> Case:
-        """The same case under other rules of decision: fits are kept, what rules decide is asked again."""
+        """The same case under another policy: fits are kept, decisions are recomputed."""
         other = Case(self.system, self.split, policy, self.seed, self.suspected)
         other._answers = {asked: found for asked, found in self._answers.items() if asked[0] in _FITS}
         return other
 
     def fit_base(self, starts: int) -> Fit:
-        """Base fitted to the trials to fit, with a floor from what repeats' residuals differ by among all but the
-        final trials."""
+        """Fit the base model to the trials to fit, with a noise floor from the differences between repeats' residuals
+        in all trials but the final ones."""
         structure, split = Structure(self.system), self.split
         floor = estimate_noise(self.system, split.fit + split.judging)
         vectors = spread_starts(structure, structure.start(), starts, self.seed)
@@ -90,17 +90,17 @@ class Case:
         return self._again(first, sharper)
 
     def _again(self, fitted: Fit, floor: NoiseFloor) -> Fit:
-        """The same explanation fitted to the end against another floor."""
+        """The same explanation fitted to convergence against another floor."""
         problem = fitted.problem.over(self.split.fit, floor)
         solution = solve(problem, fitted.solution.point, relative=_FINE)
         return Fit(problem, renewed(problem, solution, relative=_FINE), fitted.starts, fitted.starts_agreeing)
 
     def sharply(self, candidate: Candidate) -> Candidate:
-        """The same against the floor that its own residuals show, for as long as that falls and the explanation
-        suffices. What each run begins with (a nuisance) may differ by more than the noise: it is in the first floor,
-        which holds the nuisances where they are expected, so that the next floor still has some of it, and nothing
-        would stand out. Not where factors of parameters are among them: such a system's own scatter stays in the floor,
-        since a run has to be predicted without knowing it (`predictive`)."""
+        """Refit against the floor that the explanation's own residuals show, as long as the floor falls and the
+        explanation suffices. Nuisances such as a run's initial state may scatter by more than the noise. The first
+        floor, estimated with nuisances at their expected values, contains all of that scatter and the next one still
+        some of it, which would hide structure. Nothing is done if any nuisance is a factor of parameters: that scatter
+        belongs in the floor, since a run has to be predicted without knowing its factors (`predictive`)."""
         if any(p.factor_of for parameters in candidate.fitted.problem.nuisances for p in parameters):
             return candidate
         for _ in range(SHARPENED):
@@ -116,14 +116,15 @@ class Case:
 
     @_once
     def on_known(self, candidate: Candidate) -> Fit:
-        """The explanation fitted to all known trials, every one with the same effort."""
+        """The explanation fitted to all known trials, with the same effort for every explanation."""
         near = (candidate.fitted, candidate.checked)
         return refit_on(candidate.fitted, self.split.known, near=near, relative=_FINE)
 
     @_once
     def settled(self, candidate: Candidate) -> Fit:
-        """The same at its very optimum, with derivatives that say how well its parameters are known: what these are
-        told from. Where the system wants it so, of every trial: those that judged it have done so."""
+        """The explanation at its optimum, with fresh derivatives: the basis of the reported parameters and their
+        uncertainties. If the system sets `tells_of_all`, it is fitted to every trial: once judging is over, the trials
+        that judged may inform parameters, too."""
         fitted, others = self.on_known(candidate), self.split.not_fitted
         if self.system.tells_of_all and others:
             near = (fitted, evaluate_on(fitted, others))
@@ -137,8 +138,9 @@ class Case:
 
     @_once
     def converged(self, candidate: Candidate) -> Fit:
-        """The same to the end of plain least squares: what a verdict rests on. Where a few large residuals lead these
-        astray, so that conditions never fitted are predicted worse, it stays where it was."""
+        """The explanation followed to convergence by plain least squares: the basis of the verdict. If a few large
+        residuals mislead plain least squares, so that never-fitted conditions are predicted worse, the fit before it is
+        returned."""
         fitted = self.on_known(candidate)
         ended = converged(fitted)
         return fitted if self._astray(ended, fitted) else ended
@@ -153,18 +155,18 @@ class Case:
 
     @_once
     def remainder_of(self, candidate: Candidate) -> Remainder:
-        """What an explanation leaves at the end of plain least squares: what a verdict rests on."""
+        """The remainder of an explanation converged by plain least squares: the basis of the verdict."""
         return self.remainder(self.converged(candidate))
 
     def remainder(self, fitted: Fit) -> Remainder:
-        """What a fit leaves, on its own trials and on the others that may inform a choice."""
+        """The remainder of a fit on its own trials and on the other trials that may inform a choice."""
         names = {t.name for t in fitted.problem.trials}
         others = [t for t in self.split.known + self.split.unseen if t.name not in names]
         return self._tested(fitted, evaluate_on(fitted, others))
 
     @_once
     def suffices(self, candidate: Candidate) -> bool:
-        """Whether an explanation leaves nothing that matters once it is fitted to all known trials."""
+        """Whether an explanation, fitted to all known trials, leaves nothing that matters."""
         return (
             self.nearly(candidate)
             and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
@@ -174,9 +176,9 @@ class Case:
 
     @_once
     def hidden(self, candidate: Candidate) -> str | None:
-        """An effect that takes away what matters though repeats need not share it, so that the floor contains it: one
-        that has values of its own in every trial, or one that the parameters shut out (`Effect.apart`), whose part the
-        nuisances of each run take over."""
+        """An effect that removes something that matters although repeats need not share it, so that it hides in the
+        floor: either an effect with values of its own in every trial, or one that the parameters disable
+        (`Effect.apart`) and whose part the nuisances of each run absorb. None if there is no such effect."""
         library, workers, parent = self.system.effects, Workers(lambda _: None), candidate.fitted
         if parent.structure.sites:  # nothing is grown on a learnt curve
             return None
@@ -194,27 +196,28 @@ class Case:
 
     @_once
     def followed(self, candidate: Candidate) -> tuple[Followed, ...]:
-        """Nuisances that still follow the condition with an explanation: what none of the runs' own could be."""
+        """Nuisances that still follow the condition under an explanation, which independent draws for each run do not.
+        Empty unless the system declares that nuisances are drawn for each run."""
         if not self.system.nuisances_per_run:
             return ()
         return find_followed(self._on_all(candidate), policy=self.policy, seed=self.seed)
 
     def met_by_chance(self, before: Candidate, after: Candidate) -> float:
-        """The probability that what nuisances followed `before` is met by the effects that `after` has more, if it is
-        any number that each condition happens to have."""
+        """The probability that the additional effects of `after` would reproduce the condition-dependence of the
+        nuisances under `before` as well as they do if each condition's values were arbitrary numbers."""
         library = self.system.effects
         extra = sum(len(library[name].parameters) for name in after.effects if name not in before.effects)
         first, then = (by_condition(self._on_all(one)) for one in (before, after))
         return met_by_chance(first, then, self.followed(before), extra)
 
     def _on_all(self, candidate: Candidate) -> list[Fit]:
-        """An explanation on all trials that may inform a choice."""
+        """The fits of an explanation that cover all trials that may inform a choice."""
         known = self.converged(candidate)
         return [known, evaluate_on(known, self.split.unseen)]
 
     def dominated(self, candidate: Candidate, better: Candidate) -> bool:
-        """Whether an explanation leaves what matters beside what one that is surely better leaves. Walks that fail by
-        their friction differ so much from repeat to repeat that what these share may pass for chance."""
+        """Whether an explanation leaves relevantly more than one that is better beyond doubt. Needed because repeats of
+        a walk that fails through friction differ so much that what they share may pass for chance."""
         mine, others = self.converged(candidate), self.converged(better)
         both = [([mine], [others])]
         if unseen := self.split.unseen:
@@ -222,12 +225,13 @@ class Case:
         return self.exceeds_on_all(*both)
 
     def exceeds(self, candidate: Candidate, better: Candidate) -> bool:
-        """The same of the explanations as they are, on the trials that they are judged on."""
+        """Like `dominated`, but for the candidates without a refit, on the trials that they are judged on."""
         return self.exceeds_on_all(([candidate.fitted], [better.fitted]), (candidate.judged, better.judged))
 
     def exceeds_on_all(self, *both: tuple[Sequence[Fit], Sequence[Fit]]) -> bool:
-        """Whether the first fits of any pair leave by more than is relevant more than the second; or, of every pair,
-        would have left so if a run's factors had to be predicted, which a few runs of one pair may be by chance."""
+        """Whether, in any pair, the first fits leave relevantly more than the second ones; or whether they do so in
+        every pair if each run's factors are set to their means (`predictive`), since a few runs of one pair may differ
+        that way by chance."""
         known = (excess_over(*pair, self.system.accuracy) for pair in both)
         unseen = (tuple([predictive(fit) for fit in fits] for fits in pair) for pair in both)
         ahead = (excess_over(mine, others, self.system.accuracy) for mine, others in unseen)
@@ -235,16 +239,16 @@ class Case:
 
     @_once
     def nearly(self, candidate: Candidate) -> bool:
-        """Whether an explanation leaves so little that its fit, begun elsewhere, might leave nothing that matters."""
+        """Whether an explanation leaves so little that a fit from another start might leave nothing that matters."""
         return self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
 
     def may_be_lost(self, candidate: Candidate) -> bool:
-        """Whether what an explanation leaves may be its fit's failure."""
+        """Whether what an explanation leaves may be due to a local optimum of its fit."""
         return self.nearly(candidate) and not self.suffices(candidate)
 
     def closed(self, candidate: Candidate, base: Candidate) -> float:
-        """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may
-        inform a choice."""
+        """The share of the base model's gap that an explanation closes on the trials that judge it and that it was not
+        fitted to."""
         if base in self.by_turns and candidate in self.by_turns:
             base, candidate = self.by_turns[base], self.by_turns[candidate]
         scaled = by_trial([candidate.fitted, candidate.checked])

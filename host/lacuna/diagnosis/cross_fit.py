@@ -1,7 +1,8 @@
-"""Without repeats, every known record judges once: explanations are refitted without it, and predict it.
+"""Cross-validation by whole records (Stone 1974) for data without repeats.
 
-Which record selects is otherwise a matter of the order in which they are given, and of few records each is of another
-kind. Cross-validation by whole records (Stone 1974), each fit begun where the explanation stands.
+Every known record judges once: explanations are refitted without it, from their fit to all known records, and predict
+it. A fixed selection would depend on the order in which the records are given, and with few records each may be of a
+different kind.
 """
 
 from __future__ import annotations
@@ -18,15 +19,15 @@ from lacuna.estimation.fit import Fit, evaluate_on, refit_on
 from lacuna.system import Record, groups_of_repeats
 
 _FOLDS = 5
-_COMPARED = 10  # explanations, the best first
-# Fine: a fit that stays where it was knows what it is to predict.
+_COMPARED = 10  # largest number of explanations cross-validated, best first
+# Fine tolerance: a refit that stays where it was would still know the records that it has to predict.
 _REFIT: dict[str, Any] = {"max_iterations": 12, "relative": 1e-5}
 
 
 @dataclass(frozen=True, eq=False)
 class CrossFitted(Candidate):
-    """An explanation `fitted` to all known records; `left_out`: its fits to the others, each on what it was not fitted
-    to."""
+    """An explanation `fitted` to all known records. `left_out`: its refits without one fold of records, each evaluated
+    on that fold, and its evaluation on the conditions never fitted, if any."""
 
     left_out: tuple[Fit, ...]
 
@@ -40,13 +41,13 @@ class CrossFitted(Candidate):
 
 
 def is_due(case: Case) -> bool:
-    """Whether records judge by turns: no condition has repeats, and there are others to fit."""
+    """Whether to cross-validate: no condition has repeats, and there are more than two known records."""
     return len(case.split.known) > 2 and all(len(group) == 1 for group in groups_of_repeats(case.system.trials))
 
 
 def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
-    """`found` with its leading explanations, and what they contain, judged on every known record; the case knows them
-    by their originals."""
+    """Cross-validate the leading explanations of `found` and their subsets on every known record. The case maps the
+    original candidates to these (`Case.by_turns`)."""
     least = min(c.cost for c in found.tried)
     near = [c for c in found.tried if c is not found.base and c.cost < case.policy.reach * least]
     near.sort(key=lambda c: c.cost)
@@ -74,7 +75,7 @@ def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
 
 
 def _left_out(fitted: Fit, fold: Sequence[Record]) -> Fit:
-    """The explanation fitted to the other records, on these."""
+    """The explanation refitted without the records in `fold` and evaluated on them."""
     names = {trial.name for trial in fold}
     others = [trial for trial in fitted.problem.trials if trial.name not in names]
     return evaluate_on(refit_on(fitted, others, near=(fitted,), **_REFIT), fold, near=fitted)

@@ -1,8 +1,8 @@
 """From fitted explanations to a choice: the smallest set of effects that predicts no worse than the best of all tried.
 
-A set is out if another one predicts better beyond doubt, by what matters, and by more than the wrong form of the
-effects that it has would leave. Of those that stay the smallest is chosen (the idea of a model confidence set; Hansen,
-Lunde and Nason 2011), and what may stand in the place of an effect of it is said.
+A set is dominated if another set predicts better beyond doubt, by a margin that matters, and by more than a wrong
+functional form of its own effects could account for. The smallest set that is not dominated is chosen (the idea of a
+model confidence set; Hansen, Lunde and Nason 2011), and for each of its effects the possible substitutes are reported.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.search import Search
 from lacuna.system import groups_of_repeats
 
-_DRAWS = 1000  # of the bootstrap over conditions
-_COMPARED = 16  # explanations, the best first
-_FEWEST = 3  # conditions that tell what differs between conditions; of fewer the trials are drawn
+_DRAWS = 1000  # bootstrap draws over conditions
+_COMPARED = 16  # largest number of further explanations to compare, best first
+_FEWEST = 3  # conditions needed to estimate the variation between conditions; with fewer, trials are resampled
 
 Judgement = Callable[[Candidate, Candidate], bool]
 
 
 class Compared(NamedTuple):
-    """An explanation beside the chosen one. `worse_by`: log-likelihood in all of the trials that neither was fitted to,
-    and `standard_error` of that, by how it differs from condition to condition."""
+    """An explanation compared with the chosen one. `worse_by`: the difference in log-likelihood, summed over all trials
+    that neither was fitted to; `standard_error` of that sum, from its variation between conditions."""
 
     effects: tuple[str, ...]
     worse_by: float
@@ -38,11 +38,12 @@ class Compared(NamedTuple):
 
 @dataclass(frozen=True)
 class Choice:
-    """The chosen explanation, the base if nothing is worth adding.
+    """The chosen explanation; the base model if nothing is worth adding.
 
-    `freed`: the same effects in a form of their own, if that explains more; `confusable_with`: by effect, those that it
-    could be exchanged for; `probability`: of each effect or what it could be exchanged for, against every set that is
-    no larger; `weights`: of every explanation compared, by its effects; `compared`: these, the best first.
+    `freed`: the same effects in a freed form (with a learnt curve), if that explains more; `confusable_with`: for each
+    effect, those it could be exchanged for; `probability`: for each effect, the weight of the sets that contain it or a
+    substitute for it, among the sets that are no larger; `weights`: of every explanation compared, by its effects;
+    `compared`: these explanations, best first.
     """
 
     candidate: Candidate
@@ -54,14 +55,14 @@ class Choice:
 
     @property
     def explanation(self) -> Candidate:
-        """The chosen effects, in the form in which they explain most."""
+        """The chosen effects in the form that explains most: freed if there is one, else as in the library."""
         return self.freed or self.candidate
 
 
 def choose(search: Search, policy: Policy, matters: Judgement) -> Choice:
-    """The smallest set that predicts no worse than any other. What does so surely, if by little, has to be a part of
-    what explains: of which every effect, or what may stand in its place, has most of the weight behind it.
-    `matters(one, other)`: whether what the other predicts better is more than the accuracy that counts."""
+    """Choose the smallest set that is not dominated by any other. A set that is worse than the best beyond doubt, even
+    if by too little to be dominated, is chosen only if each of its effects, or a substitute for it, has most of the
+    weight. `matters(one, other)`: whether `one` leaves more than `other` by a margin that counts."""
     against = Comparison(search, policy, matters)
     everything = sorted((*search.tried, *search.freed), key=lambda c: c.cost)
     best = everything[0]
@@ -85,12 +86,12 @@ def _supported(candidate: Candidate, weights: dict[tuple[str, ...], float], poli
 
 
 def _behind(effect: str, weights: dict[tuple[str, ...], float], rivals: Sequence[tuple[str, ...]]) -> float:
-    """The weight of all sets with this effect, or with others in its place."""
+    """The total weight of the sets that contain this effect, or another in its place."""
     return sum(w for effects, w in weights.items() if effect in effects or effects in rivals)
 
 
 def _without_one(chosen: Candidate, search: Search, against: Comparison) -> Candidate | None:
-    """`chosen` less an effect without which it predicts no worse."""
+    """`chosen` without an effect that it does not need to predict as well; None if it needs all."""
     for effect in chosen.effects:
         smaller = search.with_effects([e for e in chosen.effects if e != effect])
         if smaller is not None and not against.dominated(smaller, against.form(chosen)):
@@ -100,14 +101,14 @@ def _without_one(chosen: Candidate, search: Search, against: Comparison) -> Cand
 
 @dataclass(frozen=True)
 class Comparison:
-    """Of two explanations, whether one predicts worse than the other."""
+    """Pairwise comparison of explanations by how well they predict."""
 
     search: Search
     policy: Policy
     matters: Judgement
 
     def dominated(self, candidate: Candidate, better: Candidate) -> bool:
-        """Whether an explanation predicts worse, in whichever form of its own."""
+        """Whether an explanation predicts worse than `better` in each of its forms (as in the library, and freed)."""
         forms = {candidate, self.form(candidate)}
         return better not in forms and all(self.worse(form, better) for form in forms)
 
@@ -115,13 +116,13 @@ class Comparison:
         return self.search.freed_form(candidate) or candidate
 
     def worse(self, one: Candidate, other: Candidate) -> bool:
-        """Whether `one` predicts worse than `other`: beyond doubt, by what matters, and by more than would be left by
-        the wrong form of an effect that is there."""
+        """Whether `one` predicts worse than `other`: beyond doubt, by a margin that matters, and by more than a wrong
+        functional form of an effect already included would account for."""
         return self.surely(one, other) and self._by_much(one, other) and self.matters(one, other)
 
     def surely(self, one: Candidate, other: Candidate) -> bool:
-        """Better by more than noise and remaining misfit make of nothing, also on trials that it was not fitted to, and
-        whichever conditions had been measured."""
+        """Whether `other` is better by more than noise and remaining misfit can explain, on trials that it was not
+        fitted to as well, and robustly to the choice of conditions measured."""
         least = self.policy.gain * _extra(one, other)
         gain = (one.cost - other.cost) / self.dispersion
         unseen = (one.checked_cost - other.checked_cost) / self.dispersion
@@ -133,14 +134,15 @@ class Comparison:
         )
 
     def _by_much(self, one: Candidate, other: Candidate) -> bool:
-        """Whether each effect more takes its share of what is left away, and a share of the gap, or half of all that is
-        left. Mean squares on trials not fitted, large residuals at their full size."""
+        """Whether each additional effect closes the required share of what is left, and also either the required share
+        of the gap or half of what is left. By mean squares on trials not fitted, without compression of large
+        residuals."""
         squares = _mean_squares(one, other, self.search.base)
-        if squares is None:  # one of them cannot predict what the other can
+        if squares is None:  # `other` predicts trials that `one` cannot
             return True
         mine, others, base = squares
         extra, left, gap, closed = _extra(one, other), max(mine - 1.0, 0.0), base - 1.0, mine - others
-        if gap <= self.policy.relevance:  # nuisances took up what is missing
+        if gap <= self.policy.relevance:  # nuisances have absorbed what is missing
             return True
         share = min(extra * self.policy.share, 0.9) * left
         return closed > share and (closed > extra * self.policy.share_of_gap * gap or closed > (1 - 0.5**extra) * left)
@@ -155,8 +157,8 @@ def _extra(one: Candidate, other: Candidate) -> int:
 
 
 def _mean_squares(*candidates: Candidate) -> list[float] | None:
-    """Of each on the trials that none of them was fitted to and all can predict, conditions counting alike; None if the
-    second of them can predict more of these than the first."""
+    """Mean square of each candidate on the trials that none was fitted to and all can predict, conditions weighted
+    equally. None if the second candidate can predict more of these trials than the first."""
     lost = [c.checked_error[0] for c in candidates[:2]]
     if lost[1] < lost[0]:
         return None
@@ -167,27 +169,27 @@ def _mean_squares(*candidates: Candidate) -> list[float] | None:
 
 
 def dispersion_of(tried: Sequence[Candidate]) -> float:
-    """By how much the best explanation's residual exceeds the floor: evidence is counted in this unit, so that a model
-    with much left to explain is not sure of anything."""
+    """The factor by which the best explanation's mean square exceeds the floor's, at least 1. Evidence is counted in
+    this unit, so that nothing is certain while even the best model leaves much unexplained."""
     best = min(tried, key=lambda c: c.cost)
     return max(1.0, best.cost / (0.5 * best.pieces))
 
 
 def _by_chance(one: Candidate, other: Candidate) -> float:
-    """The probability that `one` predicts as well as `other` where the conditions are resampled (the Bayesian
-    bootstrap, Rubin 1981): what a model explains differs from condition to condition."""
+    """The probability that `one` predicts at least as well as `other` when conditions are resampled (Bayesian
+    bootstrap, Rubin 1981), since how well a model explains the data differs from condition to condition."""
     costs = _by_condition([one, other], "unseen_by_trial", mean=True)
     ahead = _drawn(costs.shape[1]) @ (costs[0] - costs[1])
     return float(np.mean(ahead <= 0.0))
 
 
 def _drawn(conditions: int) -> np.ndarray:
-    """Weights of the conditions, a row each draw; 1 on average."""
+    """Bootstrap weights, shape (draws, conditions), 1 on average."""
     return np.random.default_rng(0).dirichlet(np.ones(conditions), _DRAWS) * conditions
 
 
 def _by_condition(candidates: Sequence[Candidate], which: str, *, mean: bool = False) -> np.ndarray:
-    """Costs of each candidate's trials by condition, their sums or means, a row each; by trial where there are few
+    """Costs per condition, sums or means over its trials, shape (candidates, conditions). Per trial if there are few
     conditions."""
     costs = [getattr(c, which) for c in candidates]
     trials = [t for t in candidates[0].trials if t.name in costs[0]]
@@ -202,7 +204,7 @@ def _by_condition(candidates: Sequence[Candidate], which: str, *, mean: bool = F
 
 
 def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
-    """`chosen` with the weight of each of its effects, or of what it could be exchanged for."""
+    """`chosen` as a `Choice`, with the weight behind each of its effects and what each could be exchanged for."""
     dispersion = dispersion_of(search.tried)
     compared = _compared(search, chosen)
     weights = _weights(compared, dispersion)
@@ -217,7 +219,7 @@ def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
 
 
 def _beside(compared: Sequence[Candidate], weights: dict[tuple[str, ...], float]) -> tuple[Compared, ...]:
-    """Every explanation beside the first."""
+    """Every explanation compared with the first."""
     costs = _by_condition(compared, "unseen_by_trial")
     apart, count = costs - costs[0], costs.shape[1]
     errors = np.sqrt(count) * apart.std(axis=1, ddof=1) if count > 1 else np.full(len(apart), np.nan)
@@ -230,7 +232,7 @@ def _beside(compared: Sequence[Candidate], weights: dict[tuple[str, ...], float]
 
 def _compared(search: Search, chosen: Candidate) -> list[Candidate]:
     """`chosen`, the base model, and the best of everything else that was tried."""
-    # what was tried of the chosen effects may have ended in another minimum than they have been found in since
+    # the search may have fitted the chosen effects to a worse local optimum than the one found since
     others = [c for c in search.tried if c.effects and frozenset(c.effects) != frozenset(chosen.effects)]
     best = sorted(others, key=lambda c: c.cost)[:_COMPARED]
     return [chosen, *([search.base] if chosen.effects else []), *best]
@@ -239,9 +241,9 @@ def _compared(search: Search, chosen: Candidate) -> list[Candidate]:
 def _weights(compared: Sequence[Candidate], dispersion: float) -> dict[tuple[str, ...], float]:
     """Weight of each explanation among those compared (pseudo-BMA+; Yao and others 2018).
 
-    A likelihood alone would be sure by e^1000 of a model that is wrong by something: what a wrong model explains well
-    differs from condition to condition. So the conditions are resampled, and an explanation's weight is the mean, over
-    the draws, of its share of the likelihood in units of the dispersion.
+    The likelihood alone would favour one slightly wrong model over another by factors such as e^1000, although which of
+    them explains better differs from condition to condition. So conditions are resampled, and an explanation's weight
+    is its share of the likelihood, tempered by the dispersion and averaged over the draws.
     """
     costs = _by_condition(compared, "by_trial")
     penalty = np.array([c.cost for c in compared]) - costs.sum(axis=1)
@@ -252,7 +254,7 @@ def _weights(compared: Sequence[Candidate], dispersion: float) -> dict[tuple[str
 
 
 def _rivals(chosen: tuple[str, ...], weights: dict[tuple[str, ...], float], policy: Policy) -> list[tuple[str, ...]]:
-    """Sets of as many effects that are not ruled out beside the chosen one, the most probable first."""
+    """Other sets with as many effects that the data do not rule out against the chosen one, most probable first."""
     mine = weights[chosen]
     found = [
         (weight, effects)

@@ -1,4 +1,4 @@
-"""From trials to a verdict: fit, detect, trace, decide, learn what is left, and say what to measure next."""
+"""From trials to a verdict: fit, test, locate, decide, learn the discrepancy, and propose what to measure next."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from lacuna.system import Correction, CorrectionSite, System
 
 @dataclass(frozen=True)
 class Left:
-    """What the named effects (or the base model) leave. `share_of_gap`: of the base model's gap."""
+    """What remains after the named effects (or the base model); `share_of_gap` is relative to the base model's gap."""
 
     remainder: Remainder
     signature: Signature
@@ -52,12 +52,13 @@ class Left:
 class Diagnosis:
     """The engine's answer to three questions.
 
-    `verdict`: "none" (nothing that matters), "identified" (the mechanisms in `effects` are supported), or "unexplained"
-    (something matters and no mechanism is supported). `base`, `explained` and `final` are fitted to all known trials:
-    the base model, that with the named effects, and that with the curves `learnt` on top where they hold.
-    `base_parameters`: of the base model in company of the named effects; none where the data remain unexplained.
-    `told`: the fit that parameters, their intervals and warnings come from, fitted to every trial of a plain function.
-    `signature`: where what the base model lacks lives; `left`: what the named effects leave.
+    `verdict`: "none" (nothing missing that matters), "identified" (the mechanisms in `effects` are supported), or
+    "unexplained" (something matters and no mechanism is supported). `base`, `explained` and `final` are fitted to all
+    known trials: the base model, the base model with the named effects, and the latter with the `learnt` curves that
+    held up on the final trials. `base_parameters`: the base model's parameters fitted jointly with the named effects;
+    empty if the data remain unexplained. `told`: the fit that reported parameters, intervals and warnings come from;
+    for a model given as a plain function it is fitted to every trial. `signature`: where the residual of the base model
+    lies and what it depends on; `left`: what the named effects leave.
     """
 
     verdict: str
@@ -99,21 +100,21 @@ def diagnose(
     on_progress: OnProgress = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
-    """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Effects that are
-    `suspected`, as by a diagnosis of fewer trials, are fitted whatever they promise, unless the base model suffices.
-    Explanations are tried on `executor`, if there is one that can ship the system. Ctrl-C while explanations or curves
-    are tried ends that with the best so far. Raises MisuseError before the search where the system or its trials would
-    mislead it."""
+    """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a given seed. `suspected`
+    effects, for example those named by a diagnosis of fewer trials, are fitted whatever their score, unless the base
+    model suffices. Explanations are tried on `executor` if one is given, which must be able to ship the system. Ctrl-C
+    while explanations or curves are tried stops the search and continues with the best result so far. Raises
+    MisuseError before the search if the system or its trials would mislead it."""
     began = time.monotonic()
     if unknown := sorted(set(suspected) - set(system.effects)):
         raise MisuseError(f"suspected: there is no effect {unknown[0]!r}; there are {', '.join(system.effects)}.")
     cautions = check(system)
     split = split_trials(system.trials, system.spare(), system.test())
     if not split.fit:
-        raise TooLittleDataError("Every condition is `spare`, and none is left to be fitted: name fewer.")
+        raise TooLittleDataError("Every condition is `spare`, so none is left to fit: declare fewer of them spare.")
     if not split.judging:
         raise TooLittleDataError(
-            "There is nothing to judge explanations by besides what is fitted: a diagnosis needs at least three trials."
+            "All trials are fitted and none is left to judge explanations: a diagnosis needs at least three trials."
         )
     case = Case(system, split, policy, seed, suspected)
     hand = Stoppable(Workers(on_progress, executor, forks=system.forks))
@@ -139,17 +140,17 @@ def diagnose(
 
 
 def decided(case: Case, found: Search, hand: Stoppable) -> tuple[Search, Choice, Assessed]:
-    """What of everything tried is named, and the verdict; with what was tried on the way to it."""
+    """Decide which effects to name, and the verdict. The returned search includes what was tried while deciding."""
     choice = hand.ask(
         lambda: _chosen(case, found, hand.workers),
         lambda: choose(found, case.policy, case.exceeds),
-        "one record in five chooses",
+        "choosing without cross-validation",
     )
     found, choice = eliminate(case, found, choice)
     found, choice = hand.ask(
         lambda: explain_nuisances(case, found, choice, hand.workers),
         lambda: (found, choice),
-        "what nuisances follow is not asked",
+        "no effect is sought behind the nuisances",
     )
     judged = _judged(case, found, choice)
     while (smaller := _without_harm(case, found, choice, judged)) is not None:
@@ -159,8 +160,8 @@ def decided(case: Case, found: Search, hand: Stoppable) -> tuple[Search, Choice,
 
 
 def _told(case: Case, judged: Assessed, shown: Candidate, final: Fit) -> Fit:
-    """The fit that a verdict tells parameters from: of the explanation or, with curves or where nothing is explained,
-    of the final model."""
+    """The fit that parameters are reported from: the explanation's, or the final model's if that has curves or nothing
+    is explained."""
     if judged.verdict != "unexplained" and not final.structure.sites:
         return case.settled(shown)
     others = case.split.not_fitted if case.system.tells_of_all else ()
@@ -170,7 +171,7 @@ def _told(case: Case, judged: Assessed, shown: Candidate, final: Fit) -> Fit:
 
 
 def _chosen(case: Case, found: Search, workers: Workers) -> Choice:
-    """What explains best; without repeats, by what predicts every known record."""
+    """Choose the best explanation; without repeats, by cross-validation over all known records."""
     if len(found.tried) == 1 or not is_due(case):
         return choose(found, case.policy, case.exceeds)
     choice = choose(cross_fitted(case, found, workers), case.policy, case.exceeds)
@@ -180,10 +181,11 @@ def _chosen(case: Case, found: Search, workers: Workers) -> Choice:
 
 @dataclass(frozen=True)
 class Assessed:
-    """The verdict and what it rests on: both models fitted to all known trials (`Case.converged`), their errors
-    `before` and `after`, and what each leaves; `unshared`: where the base model leaves what matters and repeats do not
-    surely share, a sentence that says so. `floor` and `drifts` are seen with the chosen effects, whatever the verdict.
-    `tested`: the share of the gap that these close on the final trials; None where there is no gap, or no such trial.
+    """The verdict and its evidence: both models fitted to all known trials (`Case.converged`), their errors `before`
+    and `after`, and what each leaves (`remainder`, `left`). `unshared`: a sentence, if the base model lacks something
+    that matters although repeats do not demonstrably share it; otherwise empty. `floor` and `drifts` are computed with
+    the chosen effects, whatever the verdict. `tested`: the share of the gap that the chosen effects close on the final
+    trials; None if there is no gap or no final trial.
     """
 
     verdict: str
@@ -220,18 +222,18 @@ def _judged(case: Case, found: Search, choice: Choice) -> Assessed:
 
 
 def _explains(case: Case, found: Search, choice: Choice, unshared: str, tested: float | None) -> bool:
-    """Whether the chosen effects close half of the gap, wherever that is told."""
+    """Whether the chosen effects close half of the gap wherever that can be measured."""
     if not choice.candidate.effects:
         return False
-    # of what passes for noise, or nuisances take up, there is no gap to close half of
+    # what passes for noise or is absorbed by nuisances leaves no gap of which half could be closed
     hidden, half = bool(unshared or _taken_up(case, choice, found)), case.policy.half
     closes = case.closed(choice.explanation, found.base) >= half or (hidden and case.suffices(choice.explanation))
     return closes and (tested is None or tested >= half)
 
 
 def _without_harm(case: Case, found: Search, choice: Choice, judged: Assessed) -> Choice | None:
-    """`choice` less the effect without which the final trials are predicted better, if it is one of several; these
-    inform no choice, but what they contradict is not named."""
+    """`choice` without the effect whose removal improves the prediction of the final trials most, if there is one and
+    it is not the only effect. The final trials inform no choice, but an effect that they contradict is not named."""
     if judged.tested is None or len(choice.candidate.effects) < 2:
         return None
     lost = lost_without(case, found, choice)
@@ -245,23 +247,23 @@ def _without_harm(case: Case, found: Search, choice: Choice, judged: Assessed) -
 
 def _unshared(case: Case, choice: Choice, found: Search) -> str:
     if hidden := case.hidden(found.base):
-        return f"What repeats differ by, or what the nuisances of each take up, is no noise: {hidden} would explain it."
+        return f"What repeats differ by, or what their nuisances absorb, is not noise: {hidden} would explain it."
     if choice.candidate.effects and case.dominated(found.base, choice.explanation):
         named = " and ".join(choice.candidate.effects)
-        return f"What repeats share may be chance, but {named} would take away more of it than the accuracy allows."
+        return f"The residual that repeats share may be chance, but {named} would remove a part of it that matters."
     if choice.candidate.effects and (taken_up := _taken_up(case, choice, found)):
         return f"{warn.follow_in_words(taken_up)}: {' and '.join(choice.candidate.effects)} explains it."
     return ""
 
 
 def _taken_up(case: Case, choice: Choice, found: Search) -> list[Followed]:
-    """The nuisances that follow the condition with the base model, and no longer with what was chosen."""
+    """The nuisances that follow the condition with the base model but not with the chosen explanation."""
     still = {one.nuisance for one in case.followed(choice.explanation)}
     return [one for one in case.followed(found.base) if one.nuisance not in still]
 
 
 def _doubts(case: Case, choice: Choice, judged: Assessed, effects: tuple[Named, ...]) -> list[str]:
-    """What speaks against a verdict that names `effects`, or none."""
+    """Warnings that qualify a verdict naming `effects`, which may be empty."""
     if judged.verdict == "none":
         return warn.not_predicted(judged.base, case.split, judged.before, judged.floor, case.policy)
     if not effects:
@@ -280,7 +282,7 @@ def _reported(
     said: tuple[str, ...],
     seconds: float,
 ) -> Diagnosis:
-    """`fits`: the final one, and the one that is told."""
+    """Assemble the diagnosis. `fits`: the final fit, and the fit that parameters are reported from."""
     (final, told), identified, before = fits, judged.verdict == "identified", judged.before
     closed = share_of_gap(before.held_out, judged.after.held_out, judged.floor.held_out) if identified else 0.0
     shown = choice.candidate if identified else found.base
@@ -318,10 +320,10 @@ def _reported(
 
 
 def explanations(case: Case, base: Fit, hand: Stoppable) -> Search:
-    """Everything tried. Nothing is where the base model leaves nothing that matters."""
+    """Fit and return all explanations; none but the base model if that suffices."""
     first = case.judge(base)
     if case.may_be_lost(first):
-        hand.on_progress("fitting the base model from elsewhere, too")
+        hand.on_progress("fitting the base model from other starts, too")
         first = from_elsewhere(first, case.split, case.seed, hand.workers)
     first = case.sharply(first)
     if case.suffices(first):
@@ -331,14 +333,14 @@ def explanations(case: Case, base: Fit, hand: Stoppable) -> Search:
     return hand.ask(
         lambda: search(case, first, enough=case.suffices, workers=hand.workers, keep=kept.extend),
         lambda: until_now(first, kept, case.split),
-        "weighing what was found until now",
+        "judging what has been fitted so far",
     )
 
 
 def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, workers: Workers | None) -> Fit:
-    """What is explained with curves learnt on top, where they hold on trials that informed nothing; without workers
-    none are learnt. Where nothing is supported, the best of everything tried stands beside them, so that what is
-    reported is never worse than that."""
+    """The explained model with learnt curves on top, if they also improve the final trials; without workers no curves
+    are learnt. If no mechanism is supported, everything tried competes with the curves, so that the final model is
+    never worse than the best of these."""
     split, unexplained = case.split, judged.verdict == "unexplained"
     parents = list(dict.fromkeys((found.base, choice.explanation))) if unexplained else [choice.explanation]
     learnt = None

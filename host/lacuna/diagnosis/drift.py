@@ -1,4 +1,4 @@
-"""Does something change over the session? Repeats in a row hide it; the order of the trials shows it."""
+"""Does a parameter drift over the session? Consecutive repeats hide it; the order of the trials reveals it."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
 
 _SHUFFLES = 2000
-_FEWEST = 6  # trials, and as many that tell about a parameter
+_FEWEST = 6  # ordered trials, and effective number of trials that inform a parameter
 
 
 class Drift(NamedTuple):
-    """A base parameter that moves with the order of the session. `share`: what that adds to the residual's mean square,
-    in units of the floor's variance, in the experiment where it adds most."""
+    """A base parameter that changes with the order of the session. `share`: what its drift adds to the mean square
+    residual, in units of the floor's variance, in the experiment where it adds most."""
 
     parameter: str
     share: float
@@ -27,11 +27,11 @@ class Drift(NamedTuple):
 
 
 def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[Drift, ...]:
-    """Base parameters whose value, as each single trial would have it, moves with `session_order`.
+    """Find base parameters whose value, estimated from single trials, changes with `session_order`.
 
-    Each trial's residual is projected on the derivative by each parameter: the shift that this trial alone asks for,
-    weighed by how well it knows and by how much the trials differ anyway (DerSimonian and Laird 1986). The correlation
-    with the order is held against shuffled orders, all parameters at once.
+    Projecting each trial's residual on the derivative with respect to a parameter gives the shift of the parameter that
+    this trial alone would favour, weighted by its precision and by the scatter between trials (DerSimonian and Laird
+    1986). The correlation with the order is compared with that of shuffled orders, over all parameters at once.
     """
     trials = fitted.problem.trials
     places = {k: t.session_order for k, t in enumerate(trials) if t.session_order is not None}
@@ -54,15 +54,15 @@ def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[
 
 
 def _moved(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """By parameter its shift in each trial, as a weighted line through what the trials ask for has it, shape (P, n)."""
+    """Each parameter's shift in each trial, from a weighted straight-line fit to the trials' shifts, shape (P, n)."""
     place = order - (weights @ order / weights.sum(axis=1))[:, None]
     slope = (weights * asked * place).sum(axis=1) / np.maximum((weights * place**2).sum(axis=1), 1e-300)
     return slope[:, None] * place
 
 
 def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> float:
-    """What such shifts add to the mean square of the residual in the experiment where they add most; in a channel where
-    that is within the accuracy that counts, nothing."""
+    """What such shifts add to the mean square residual in the experiment where they add most; a channel in which that
+    is within the declared accuracy adds nothing."""
     squares: dict[str, float] = defaultdict(float)
     pieces: dict[str, float] = defaultdict(float)
     by_channel: dict[tuple[str, str], list[float]] = defaultdict(lambda: [0.0, 0.0])
@@ -84,8 +84,7 @@ def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> f
 
 
 def _asked(fitted: Fit, ordered: list[int]) -> tuple[list[int], np.ndarray, np.ndarray]:
-    """Columns of the parameters that enough trials tell about, and by trial the shifts asked for and their weights,
-    shapes (P, n)."""
+    """Columns of the parameters that enough trials inform, with each trial's shift and its weight, shapes (P, n)."""
     residuals, jacobians = fitted.problem.residuals(fitted.solution.point), fitted.solution.jacobians
     columns, asked, weights = [], [], []
     for column, index in enumerate(fitted.solution.free):
@@ -104,7 +103,7 @@ def _asked(fitted: Fit, ordered: list[int]) -> tuple[list[int], np.ndarray, np.n
 
 
 def _weights(shifts: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """One over the variance of each shift: what its trial cannot know, and what trials differ by beyond that."""
+    """Inverse variance of each shift: its estimation error plus the scatter between trials beyond that error."""
     total, count = known.sum(), np.count_nonzero(known)
     if count < 2:
         return known
@@ -114,13 +113,13 @@ def _weights(shifts: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _effective(weight: np.ndarray) -> float:
-    """How many trials of equal weight would tell as much."""
+    """Effective number of trials: how many of equal weight would be as informative."""
     square = float(weight @ weight)
     return float(weight.sum()) ** 2 / square if square > 0 else 0.0
 
 
 def _trend(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """By parameter the weighted correlation with the order, as standard deviations (Fisher's transform), shape (P,)."""
+    """Weighted correlation of each parameter's shifts with the order, as a z-score (Fisher's transform), shape (P,)."""
     total = weights.sum(axis=1)
     shift = asked - ((weights * asked).sum(axis=1) / total)[:, None]
     place = order - ((weights @ order) / total)[:, None]

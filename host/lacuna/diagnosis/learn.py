@@ -1,4 +1,4 @@
-"""Curves learnt from data in the equations where the discrepancy lives: for what no effect of the library explains."""
+"""Curves learnt from data at the terms of the equations where the discrepancy lies, for what no effect explains."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from lacuna.estimation.solve import Solution, solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 
-_MOST = 4  # curves in one correction
-_FITTED = 4  # sites where a curve is fitted coarsely, the most promising first,
-_SOUGHT = 8  # sites where further curves are sought
-_PROMISING = 0.5  # of the best one's promise: those that promise less are not fitted
+_MOST = 4  # largest number of curves in one correction
+_FITTED = 4  # number of sites where a curve is fitted coarsely, most promising first
+_SOUGHT = 8  # number of sites where further curves are sought
+_PROMISING = 0.5  # relative to the best promise: curves that promise less are not fitted
 _COARSE: dict[str, Any] = {"max_iterations": 8, "relative": 3e-3}
 _REFINED: dict[str, Any] = {"max_iterations": 20, "relative": 3e-4}
 
 
 class _Promise(NamedTuple):
-    """What a curve at a site would be worth: the cost that a linear regression foretells."""
+    """A curve that may be learnt at a site, with the cost predicted by linear regression."""
 
     problem: Problem
     start: Point
@@ -36,8 +36,8 @@ class _Promise(NamedTuple):
 
 
 def free_form(candidate: Candidate, split: Split, workers: Workers) -> Candidate | None:
-    """`candidate` with the curve that helps most where one of its effects may act in another form than its formula's,
-    since no real mechanism follows the formula exactly. None if none helps."""
+    """`candidate` in freed form: with the most helpful curve at a site where one of its effects may deviate from its
+    formula (`Effect.freed_at`), since no real mechanism follows a formula exactly. None if no curve helps."""
     structure = candidate.fitted.structure
     sites = {site: None for effect in structure.effects for site in structure.system.effects[effect].freed_at}
     if not sites:
@@ -49,9 +49,9 @@ def free_form(candidate: Candidate, split: Split, workers: Workers) -> Candidate
 def learn_correction(
     candidates: Sequence[Candidate], split: Split, *, enough: Callable[[Candidate], bool], workers: Workers
 ) -> Candidate | None:
-    """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
-    `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
-    None if none helps. Further ones are sought where the first regression promised most."""
+    """Learn the best curve at any of the system's sites on top of any of `candidates`, and further curves on top of
+    that until `enough(candidate)` or until none removes its share of what is left on the trials that it was not fitted
+    to. After the first regression only the most promising sites are considered. None if no curve helps."""
     best: Candidate | None = None
     sites = list(candidates[0].fitted.structure.system.correction_sites)
     while best is None or len(best.fitted.structure.sites) < _MOST:
@@ -72,8 +72,8 @@ def learn_correction(
 def _best_grown(
     parents: Sequence[Candidate], promises: Sequence[_Promise], split: Split, workers: Workers
 ) -> Candidate | None:
-    """The best of the curves promised on any of `parents`, fitted to the end, if it takes away its share of what the
-    best of these leaves."""
+    """The best of the promised curves, fitted to convergence; None if it removes less than its share of what the best
+    of `parents` leaves, or makes the uncompressed error worse."""
     before = min(parents, key=lambda c: c.checked.cost)
     policy = before.policy
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
@@ -88,16 +88,16 @@ def _best_grown(
     left = max(before.checked.cost - 0.5 * effective_samples(before.checked), 0.0)
     if best is None or before.checked.cost - best.checked.cost < policy.curve * left:
         return None
-    # to the end, from where the coarse fit stands: a curve leads the others nowhere else
+    # continued from the coarse fit: a curve does not move the other parameters to another basin
     problem, begun = best.fitted.problem, best.fitted.solution.point
     refined = judge(Fit(problem, solve(problem, begun, **_REFINED), 1, 1), split, policy, near=before.checked)
     best = min(best, refined, key=lambda c: c.checked.cost)
-    # a fit may not buy small residuals with large ones, which its cost compresses
+    # small residuals must not be bought with large ones, which the cost compresses
     return best if best.checked_error < before.checked_error else None
 
 
 def _coarse(problem: Problem, start: Point, lost: bool) -> Solution:
-    """From where the parent stands; where that may be lost, cold as well."""
+    """A coarse fit from the parent's optimum; if the parent may be `lost`, the better of that and a cold fit."""
     found = [solve(problem, start, **_COARSE)]
     if lost:
         found.append(cold(problem, initial_guess(problem.structure, problem.structure.theta(start.values))))
@@ -105,7 +105,7 @@ def _coarse(problem: Problem, start: Point, lost: bool) -> Solution:
 
 
 def _promises(candidate: Candidate, sites: Sequence[str], split: Split, workers: Workers) -> list[_Promise]:
-    """The curve of each of `sites`, regressed on what `candidate` leaves and its own parameters cannot take up."""
+    """Regress a curve at each of `sites` on the part of the residual that the candidate's parameters cannot absorb."""
     workers.on_progress("asking where a curve would help")
     parent = candidate.fitted
     basis, remaining = remaining_after(parent)
@@ -127,7 +127,7 @@ def _promises(candidate: Candidate, sites: Sequence[str], split: Split, workers:
 
 
 def holds(corrected: Fit, before: Fit, split: Split) -> bool:
-    """Whether the trials that informed nothing are predicted better, too."""
+    """Whether the final trials, which informed nothing, are predicted better as well; False if there are none."""
     if not split.final:
         return False
     mine, others = (rms(evaluate_on(fit, split.final).scaled_residuals()) for fit in (corrected, before))

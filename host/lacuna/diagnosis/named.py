@@ -1,4 +1,4 @@
-"""The effects of a verdict, each with its size, its interval, and what it explains; and what came nearest."""
+"""The effects of a verdict with their sizes, intervals and shares of the gap; and the nearest other explanations."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ _NEAREST = 5
 
 @dataclass(frozen=True)
 class Named:
-    """One effect of the verdict. `interval`: 90 % for each parameter. `share_of_gap`: of the base model's gap on final
-    trials, its part: effects share what they close together by what is lost without each. `form`: "as in the library",
-    or where it is freed; parameters are then those of the library's form that comes nearest.
+    """One effect of the verdict. `interval`: 90 % interval of each parameter. `share_of_gap`: the effect's part of the
+    base model's gap on the final trials; what the effects close together is divided in proportion to what is lost
+    without each. `form`: "as in the library", or where it is freed, in which case the parameters are those of the
+    library's form that comes nearest.
     """
 
     name: str
@@ -32,7 +33,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Estimated:
-    """A parameter of the base model, fitted together with the named effects. `interval`: 90 %."""
+    """A parameter of the base model, fitted jointly with the named effects. `interval`: 90 %."""
 
     value: float
     interval: tuple[float, float]
@@ -40,15 +41,15 @@ class Estimated:
 
 @dataclass(frozen=True)
 class Nearest:
-    """Another explanation, and the share of the gap that it would close."""
+    """Another explanation and the share of the gap that it would close."""
 
     effects: tuple[str, ...]
     share_of_gap: float
 
 
 def describe_effects(case: Case, found: Search, choice: Choice, closed: float) -> tuple[Named, ...]:
-    """Every effect of the choice, in the order of what it explains of the share `closed` of the gap between the base
-    model's error and the floor."""
+    """Every effect of the choice, largest part first; the parts add up to `closed`, the share of the base model's gap
+    that the effects close together."""
     candidate = choice.candidate
     fitted, within = case.settled(candidate), case.intervals(candidate)
     named = []
@@ -63,13 +64,13 @@ def describe_effects(case: Case, found: Search, choice: Choice, closed: float) -
 
 
 def describe_base(case: Case, candidate: Candidate) -> dict[str, Estimated]:
-    """Every parameter of the base model by name, as fitted in company of the candidate's effects."""
+    """Every parameter of the base model by name, as fitted jointly with the candidate's effects."""
     fitted, within = case.settled(candidate), case.intervals(candidate)
     return {p.name: Estimated(fitted.theta[p.name], within[p.name]) for p in case.system.parameters}
 
 
 def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Nearest, ...]:
-    """The best other explanations tried, with what each would close."""
+    """The best other explanations tried, with the share of the gap that each would close."""
     chosen = choice.candidate if choice else found.base
     others = sorted((c for c in found.tried if c.effects and c is not chosen), key=lambda c: c.cost)[:_NEAREST]
     best, split = min(found.tried, key=lambda c: c.cost), case.split
@@ -81,7 +82,7 @@ def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Nearest, 
 
 
 def _shares(case: Case, found: Search, choice: Choice, closed: float) -> list[tuple[str, float]]:
-    """Each effect with its part of what they close together of the gap, the largest first."""
+    """Each effect with its part of the share `closed`, largest first."""
     lost = lost_without(case, found, choice)
     total = sum(max(each, 0.0) for each in lost.values())
     parts = {e: max(each, 0.0) / total if total > 0.0 else 1.0 / len(lost) for e, each in lost.items()}
@@ -89,7 +90,8 @@ def _shares(case: Case, found: Search, choice: Choice, closed: float) -> list[tu
 
 
 def lost_without(case: Case, found: Search, choice: Choice) -> dict[str, float]:
-    """By effect of the choice, by how much the mean square of the final trials is higher without it, in floors."""
+    """For each effect of the choice, the increase of the final trials' mean square without it, in units of the floor's
+    variance; 1 for a single effect."""
     candidate, lost = choice.candidate, {}
     if len(candidate.effects) == 1:
         return dict.fromkeys(candidate.effects, 1.0)

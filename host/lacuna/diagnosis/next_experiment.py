@@ -1,4 +1,4 @@
-"""Which experiment would tell apart what this data cannot."""
+"""Which experiment would distinguish the explanations that this data cannot?"""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _TELLS_APART = 5.0  # log-likelihood
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """`separates`: effects that it tells apart; empty, with `experiment` None, if there is nothing to
-    separate or no experiment on offer does. `gain`: expected log-likelihood ratio between the closest
-    two."""
+    """The proposed experiment. `separates`: effects that it distinguishes; empty, with `experiment` None, if there is
+    nothing to separate or no experiment on offer does. `gain`: expected log-likelihood ratio between the two closest
+    explanations."""
 
     separates: tuple[str, ...] = ()
     experiment: str | None = None
@@ -30,8 +30,8 @@ class NextExperiment:
 
 
 def next_experiment(choice: Choice, found: Search) -> NextExperiment:
-    """The experiment on offer in which predictions by the choice, and with each of its effects exchanged for those that
-    it may be confused with, differ most, against the noise of that experiment."""
+    """The experiment on offer that best separates the choice from its rivals, in which an effect is exchanged for one
+    that it may be confused with: the one with the largest expected gain between the two closest predictions."""
     chosen = frozenset(choice.candidate.effects)
     exchanges = [(effect, other) for effect, others in choice.confusable_with.items() for other in others]
     others = [found.with_effects(chosen - {effect} | {other}) for effect, other in exchanges]
@@ -61,7 +61,8 @@ def _predict(candidate: Candidate, offer: CandidateExperiment) -> Channels:
 
 
 def expected_gain(a: Channels, b: Channels, offer: CandidateExperiment, floor: NoiseFloor) -> float:
-    """Half the squared difference in standard deviations, thinned to independent pieces."""
+    """Expected log-likelihood ratio of two predictions: half the sum of squared differences in standard deviations
+    (each at most 10), with samples thinned to independent pieces."""
     total, known = 0.0, {channel for _, channel in floor.channels}
     for channel in (c for c in a if c in known):
         noise = floor.of(offer.experiment, channel)

@@ -1,7 +1,8 @@
-"""Do nuisances follow the condition? What differs from run to run is independent in each, so repeats share none of it.
+"""Do nuisances follow the condition? A nuisance is drawn independently in each run, so repeats should not share it.
 
-A mechanism that shifts all runs of a condition alike, as another initial state or gain would, leaves no residual: the
-nuisance of each run takes it up. The model lacks it all the same, since no run of another condition can be predicted.
+A missing mechanism that shifts all runs of a condition alike, as a different initial state or gain would, leaves no
+residual, since the nuisance of each run absorbs it. The model still lacks it: runs of other conditions cannot be
+predicted.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
 from lacuna.system import Parameter, Record
 
-_DEALT = 2000
+_DEALT = 2000  # permutations of runs
 
-Runs = Mapping[str, Sequence[np.ndarray]]  # of a nuisance, by condition its values, one a run
+Runs = Mapping[str, Sequence[np.ndarray]]  # by nuisance, one array for each condition with a value for each run
 
 
 class Followed(NamedTuple):
@@ -31,7 +32,7 @@ class Followed(NamedTuple):
 
 
 class NuisanceOfRun(NamedTuple):
-    """What a trial has of a nuisance."""
+    """The fitted value of a nuisance in a trial."""
 
     trial: Record
     nuisance: Parameter
@@ -39,12 +40,13 @@ class NuisanceOfRun(NamedTuple):
 
     @property
     def away(self) -> float:
-        """From what is expected, in standard deviations."""
+        """Distance from the expected value, in standard deviations of the prior."""
         return (self.value - self.nuisance.value) / self.nuisance.step_scale
 
 
 def runs_of(fits: Sequence[Fit]) -> Iterator[NuisanceOfRun]:
-    """Every nuisance of every trial of these fits, but for an effect's own (a phase): that may do as it likes."""
+    """Every nuisance of every trial of these fits, except effects' own per-trial parameters (such as phases), for which
+    no value is more expected than another."""
     for fit in fits:
         every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
         for trial, values, parameters in every:
@@ -54,12 +56,12 @@ def runs_of(fits: Sequence[Fit]) -> Iterator[NuisanceOfRun]:
 
 
 def find_followed(fits: Sequence[Fit], *, policy: Policy, seed: int = 0) -> tuple[Followed, ...]:
-    """The nuisances of which repeats share more than chance makes of it, and so much that runs predicted without them
-    would be predicted worse than is relevant; those first that follow it most. `fits`: one explanation, each on trials
-    of its own; the first one has derivatives.
+    """The nuisances that repeats share beyond chance and by so much that predicting a run without knowing its value
+    costs more than `relevance`; the largest share first. `fits`: one explanation evaluated on disjoint sets of trials,
+    the first with derivatives.
 
-    The mean product of two repeats' nuisances, in standard deviations from the mean of all runs, is the mean square of
-    what they share. Under chance any run may be of any condition: runs are dealt out at random.
+    The mean product of two repeats' nuisances, in standard deviations from the mean of all runs, estimates the mean
+    square of what they share. Its distribution under chance comes from permuting runs among conditions.
     """
     felt = _felt(fits[0])
     tested = {name: runs for name, runs in by_condition(fits).items() if name in felt and _pairs(runs)}
@@ -77,9 +79,9 @@ def find_followed(fits: Sequence[Fit], *, policy: Policy, seed: int = 0) -> tupl
 
 
 def met_by_chance(before: Runs, after: Runs, followed: Sequence[Followed], parameters: int) -> float:
-    """The probability that so many `parameters` more take so much away of what each condition has on average of the
-    nuisances `followed`, if these are any numbers that conditions happen to have: an F-test with a sample a condition.
-    `before` and `after`: runs with either explanation."""
+    """The probability that an effect with so many additional `parameters` reduces the between-condition variation of
+    the `followed` nuisances this much if the condition means are arbitrary numbers: an F-test with one sample for each
+    condition. `before` and `after`: nuisances under the two explanations."""
     was, left = (_between(runs, followed) for runs in (before, after))
     spare = min(len(before[one.nuisance]) for one in followed) - 1 - parameters
     if spare < 1 or left >= was:
@@ -89,13 +91,13 @@ def met_by_chance(before: Runs, after: Runs, followed: Sequence[Followed], param
 
 
 def _between(runs: Runs, followed: Sequence[Followed]) -> float:
-    """Sum of squares between the conditions, over all of these nuisances."""
+    """Between-condition sum of squares, over all of these nuisances."""
     each = (runs[one.nuisance] for one in followed)
     return sum(len(v) * float(np.mean(v) - np.concatenate(of_one).mean()) ** 2 for of_one in each for v in of_one)
 
 
 def by_condition(fits: Sequence[Fit]) -> Runs:
-    """Of each nuisance, by condition its values in standard deviations from what is expected, an entry a run."""
+    """Each nuisance's values in standard deviations from their expected value, one array for each condition."""
     found: dict[str, dict[object, list[float]]] = defaultdict(lambda: defaultdict(list))
     for run in runs_of(fits):
         found[run.nuisance.name][run.trial.experiment, run.trial.condition].append(run.away)
@@ -103,7 +105,7 @@ def by_condition(fits: Sequence[Fit]) -> Runs:
 
 
 def _felt(fit: Fit) -> dict[str, float]:
-    """Of each nuisance, what a standard deviation of it does to a run's residual: mean square, in floors."""
+    """Mean square residual, in units of the floor's variance, caused by one standard deviation of each nuisance."""
     squares: dict[str, list[float]] = defaultdict(list)
     every = zip(fit.problem.trials, fit.solution.sensitivities, fit.problem.nuisances, strict=False)
     for trial, sensitivity, parameters in every:
@@ -118,7 +120,7 @@ def _pairs(runs: Sequence[np.ndarray]) -> int:
 
 
 def _shared(runs: Sequence[np.ndarray], values: np.ndarray) -> float:
-    """Mean product of different runs of a condition; `values` of all runs, one condition after another."""
+    """Mean product of different runs of the same condition; `values` holds all runs, condition by condition."""
     ends = np.cumsum([0, *(len(each) for each in runs)])
     sums, squares = (np.add.reduceat(q, ends[:-1]) for q in (values, values**2))
     return float((sums**2 - squares).sum() / 2.0 / _pairs(runs))

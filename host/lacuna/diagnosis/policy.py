@@ -1,8 +1,8 @@
-"""Every decision rule of the engine, in one place: its unit, its reason, and its origin.
+"""Every decision rule of the engine in one place, with its unit, its reason and its origin.
 
-Numerical constants (steps, tolerances, iterations) stay where they are used. These rules change verdicts. `origin`
-is "derivation" (it follows from something else), "simulation" (tuned on the toy system and on robots with known
-truth) or "convention" (a choice that others may make differently; pass another `Policy` to `diagnose`).
+These rules change verdicts; numerical constants (steps, tolerances, iterations) stay where they are used. `origin` is
+"derivation" (it follows from something else), "simulation" (tuned on the toy system and on robots with known truth) or
+"convention" (a choice that others may make differently; pass another `Policy` to `diagnose`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ class Policy:
     chance: float = _rule(
         0.005,
         "probability",
-        "a shared residual less likely by chance in any channel is structure: one false alarm in 200 data sets",
+        "a shared residual less probable than this by chance, over all channels, is structure: one false alarm in 200"
+        " data sets",
         "convention",
     )
     relevance: float = _rule(
@@ -35,7 +36,7 @@ class Policy:
     drift_chance: float = _rule(
         0.002,
         "probability",
-        "a trend over the session, over all parameters at once, against shuffled orders",
+        "a trend over the session is a drift if shuffled orders reach it, in any parameter, less often than this",
         "convention",
     )
 
@@ -43,82 +44,82 @@ class Policy:
     condition_chance: float = _rule(
         0.02,
         "probability",
-        "an effect that nuisances follow from condition to condition meets what they have there better than some effect"
-        " of the library would meet any numbers",
+        "an effect must reproduce the nuisances' dependence on the condition better than any effect of the library"
+        " would reproduce arbitrary numbers, but for this probability",
         "convention",
     )
     gain: float = _rule(
         8.0,
         "log-likelihood over dispersion",
-        "what one more effect must gain beyond the cost of its parameters: odds of 3000 to 1",
+        "gain required of each additional effect, beyond the cost of its parameters: odds of 3000 to 1",
         "convention",
     )
     unseen_gain: float = _rule(
-        0.25, "of the gain required", "part of it must come from trials that were not fitted", "simulation"
+        0.25, "of the gain required", "this part of it must come from trials that were not fitted", "simulation"
     )
     share: float = _rule(
         0.15,
         "of what is left",
-        "one more effect must close this share of the mean square that the smaller set leaves above the floor",
+        "each additional effect must close this share of the mean square that the smaller set leaves above the floor",
         "simulation",
     )
     share_of_gap: float = _rule(
         0.03,
         "of the base model's gap",
-        "no formula holds to better than a sixth of what it explains (0.17 squared): a further effect that closes less"
-        " is as likely the wrong form of the first, and goes into the remainder, unless it halves what is left",
+        "no formula is accurate to better than a sixth of what it explains (0.17 squared): a further effect that closes"
+        " less may only correct the form of the first and is left to the remainder, unless it halves what is left",
         "simulation",
     )
     half: float = _rule(
         0.5,
         "of the gap",
-        "mechanisms that together close less do not explain the data; nor does one beside a curve that does its work,"
-        " if its own formula explains less",
+        "mechanisms that together close less do not explain the data; an effect whose own formula closes less is"
+        " dropped if a learnt curve does its work",
         "convention",
     )
     confusable: float = _rule(
-        0.05, "probability", "swapping in an effect at least this probable is not ruled out", "convention"
+        0.05, "probability", "a rival set less probable than this against the chosen one is ruled out", "convention"
     )
     supported: float = _rule(
-        0.5, "weight", "a named effect, or what may stand in its place, is in most of what was tried", "convention"
+        0.5, "weight", "a named effect, or a substitute for it, must have at least this weight", "convention"
     )
     doubt: float = _rule(
         0.05,
         "probability",
-        "an explanation is worse only if it is so however the conditions are resampled, but for this share of draws",
+        "an explanation is worse only if it is so in all but this share of draws when conditions are resampled",
         "convention",
     )
     implausible: float = _rule(
-        2.0, "log-likelihood", "cost of a parameter half its plausible range outside it", "convention"
+        2.0, "log-likelihood", "cost of a parameter outside its plausible range by half that range", "convention"
     )
 
-    # How far is the search worth its time?
+    # How much searching is worthwhile?
     promising: float = _rule(
-        0.05, "of what is left", "an effect that removes less in a quick fit is not fitted to convergence", "simulation"
+        0.05, "of what is left", "an effect that removes less in a coarse fit is not fitted further", "simulation"
     )
     rival: float = _rule(
         0.3,
         "of the gain that the best promises",
-        "beside a set that suffices, one that promises less to first order is no rival",
+        "once a set suffices, only sets that promise more than this to first order are still fitted as rivals",
         "simulation",
     )
     reach: float = _rule(
         3.0,
         "times the cost of a set that suffices",
-        "rivals beyond this are not pursued: they cannot win",
+        "rivals that cost more cannot win and are not pursued",
         "derivation",
     )
     lost: float = _rule(
         2.0,
         "floors, RMS, on trials not fitted",
-        "a fit that leaves more there, large residuals at their full size, is far from any explanation: it is not"
-        " fitted to convergence before its rivals have begun, and a curve on top of it begins cold",
+        "a fit that leaves more, without compression of large residuals, is far from any explanation: its rivals are"
+        " fitted coarsely before it is fitted to convergence, and a curve on top of it is also fitted cold",
         "simulation",
     )
 
     # What is learnt?
     curve: float = _rule(
-        0.1, "of what is left on unseen trials beyond noise", "what one more curve must remove", "simulation"
+        0.1, "of what is left beyond noise on trials not fitted", "what each further curve must remove", "simulation"
     )
 
     @classmethod

@@ -1,9 +1,9 @@
-"""How a fit with effects begins and ends: the one way for all of them.
+"""Fits of sets of effects: one procedure for all of them.
 
-Every set begins cold, at the initial guess with its effects at the sizes that promised most, and is graduated: what a
-fit that lacks an effect has made of the other parameters may be in the wrong minimum. Few are fitted coarsely, the best
-of these to convergence (successive halving). A set cannot cost more than one that it contains: where it does, it begins
-once more from the optimum of that one.
+Every set begins cold, at the initial guess with its effects at the sizes that promised most, and is graduated
+(continuation): the parameters of a fit that lacks an effect may lie in the wrong basin. A few sets are fitted coarsely,
+and the best of these to convergence (successive halving). At its optimum a set cannot cost more than a subset: if a
+coarse fit does, it is begun again from the optimum of the subset.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from lacuna.estimation.structure import Structure
 
 COARSE: dict[str, Any] = {"max_iterations": 12, "relative": 3e-3}
 _TO_THE_END: dict[str, Any] = {"max_iterations": 40, "relative": 1e-4}
-_FIRST = 2  # promises: if the better one of them is enough, only its rivals follow
-_ELSEWHERE = 3  # places that a base model is begun from besides its initial guess
-NEAR = 1.3  # times the cost of a converged fit: what begins or ends beyond leads it nowhere
+_FIRST = 2  # number of promises fitted first: if the better one is enough, only its rivals follow
+_ELSEWHERE = 3  # number of further starts of a base model besides its initial guess
+NEAR = 1.3  # times the cost of a converged fit: a start or coarse fit that costs more is not worth pursuing
 
 
 def joined(one: Fit, other: Fit, gain: float) -> Promise:
-    """The effects of both, as they are in each."""
+    """The union of both fits' effects, begun at their fitted values; `one` takes precedence."""
     structure = Structure(
         one.structure.system, tuple(dict.fromkeys((*one.structure.effects, *other.structure.effects)))
     )
@@ -42,7 +42,7 @@ def joined(one: Fit, other: Fit, gain: float) -> Promise:
 
 
 def cold_starts(promise: Promise) -> list[np.ndarray]:
-    """The initial guess with its effects as they are promised, and with limits where they are declared."""
+    """The initial guess with effects at their promised sizes and, if that differs, at their declared sizes."""
     structure = promise.problem.structure
     known = structure.theta(promise.start.values)
     declared = known | _declared(structure)
@@ -50,8 +50,8 @@ def cold_starts(promise: Promise) -> list[np.ndarray]:
 
 
 def _declared(structure: Structure) -> dict[str, float]:
-    """The sizes as they are declared, of effects of which fits begin there, too (`Effect.start_factors`): a limit does
-    nothing where it is not reached, and much where it is, so that the size which promises most may be far off."""
+    """Declared sizes of the effects whose `start_factors` include them. A limit does nothing until it is reached and
+    much beyond, so the size that promises most to first order may be far from the true one."""
     effects = (structure.system.effects[name] for name in structure.effects)
     return {
         effect.full_name(p): p.value for effect in effects if 1.0 in effect.start_factors for p in effect.parameters
@@ -59,7 +59,7 @@ def _declared(structure: Structure) -> dict[str, float]:
 
 
 def initial_guess(structure: Structure, known: dict[str, float]) -> np.ndarray:
-    """The base model's initial guess, with effects and curves as they are `known`."""
+    """The base model's initial guess, with the effects and curves at their `known` values."""
     base = {p.name for p in structure.system.parameters}
     found = {name: value for name, value in known.items() if name not in base and name in structure.names}
     return structure.values(structure.theta(structure.start()) | found)
@@ -75,8 +75,8 @@ def race(
     workers: Workers,
     keep: Callable[[Sequence[Candidate]], None] = lambda _: None,
 ) -> list[Candidate]:
-    """`promises`, the most promising first, fitted coarsely, and the best of them, `most` at most, to the end. `keep`
-    is called with what there is, in case that somebody stops the race."""
+    """Fit `promises`, sorted most promising first, coarsely and at most `most` of the best to convergence. Returns all
+    candidates, best first. `keep` is called with every batch, so that candidates survive an interruption."""
     policy, done = parent.policy, []
     raced, rest = coarse_fits(parent, promises[:_FIRST], split, workers), list(promises[_FIRST:])
     keep(raced)
@@ -99,7 +99,7 @@ def race(
 def _worth_it(
     candidate: Candidate, parent: Candidate, done: Sequence[Candidate], enough: Callable[[Candidate], bool]
 ) -> bool:
-    """Whether a coarse fit explains so much that it may win."""
+    """Whether a coarse fit explains enough that it may still win."""
     policy, best = parent.policy, min(done, key=_cost, default=None)
     if best is not None and candidate.cost > (policy.reach * best.cost if enough(best) else np.inf):
         return False
@@ -127,12 +127,12 @@ def _begun(problem: Problem, begins: Sequence[np.ndarray], warm: Point, containe
 
 
 def cold(problem: Problem, values: np.ndarray) -> Solution:
-    """A coarse fit that owes nothing to earlier ones."""
+    """A coarse graduated fit, independent of earlier ones."""
     return solve_graduated(problem, values, **COARSE)
 
 
 def to_the_end(candidates: Sequence[Candidate], split: Split, workers: Workers) -> list[Candidate]:
-    """The explanations fitted to convergence."""
+    """Fit candidates to convergence; each is returned unchanged if that does not lower its cost."""
     jobs = [(c.fitted.problem, c.fitted.solution) for c in candidates]
     solutions = workers.map("finishing", [c.effects for c in candidates], converged, jobs)
     each = zip(candidates, solutions, strict=True)
@@ -141,21 +141,22 @@ def to_the_end(candidates: Sequence[Candidate], split: Split, workers: Workers) 
 
 
 def converged(problem: Problem, coarse: Solution) -> Solution:
-    """Graduated once more, since with the effects at their sizes the trials that isolate parameters lead those back
-    that were in the wrong minimum without them; and followed to the end."""
+    """Graduate a coarse solution once more and follow the better of the two to convergence. With the effects at their
+    fitted sizes, the trials that isolate parameters pull back those that had been drawn into a wrong basin."""
     again = solve_graduated(problem, coarse.point.values, **_TO_THE_END)
     return renewed(problem, min(coarse, again, key=lambda s: s.cost), **_TO_THE_END)
 
 
 def from_elsewhere(candidate: Candidate, split: Split, seed: int, workers: Workers) -> Candidate:
-    """The better of a converged explanation and its refits that begin anywhere plausible, its effects as they are."""
+    """The better of a converged explanation and its refits from random plausible base parameters (multi-start), begun
+    with its effects at their fitted values."""
     fitted, structure = candidate.fitted, candidate.fitted.structure
     problem, values = fitted.problem, fitted.solution.point.values
     begun = spread_starts(structure, values, 1 + _ELSEWHERE, seed)[1:]
     for start in begun:
         start[structure.base_size :] = values[structure.base_size :]
     jobs = [(problem, start) for start in begun]
-    found = workers.map("from elsewhere, fitting", [structure.effects] * len(jobs), cold, jobs)
+    found = workers.map("fitting from another start:", [structure.effects] * len(jobs), cold, jobs)
     best = min(found, key=lambda s: s.cost)
     if best.cost > NEAR * fitted.cost:
         return candidate
@@ -164,7 +165,8 @@ def from_elsewhere(candidate: Candidate, split: Split, seed: int, workers: Worke
 
 
 def continued(parent: Fit, effects: Sequence[str], workers: Workers) -> list[Fit]:
-    """Each effect more on a parent that leaves little, so that it is where it should be: a coarse fit from there."""
+    """Coarse fits of `parent` with each of `effects` added, from the parent's optimum. This warm start is adequate
+    because the parent leaves little, so that its parameters are near the truth."""
     library = parent.structure.system.effects
     jobs = [(*one_more(parent, effect), bool(library[effect].apart)) for effect in effects]
     found = workers.map("trying", [problem.structure.effects for problem, *_ in jobs], _continued, jobs)
@@ -172,14 +174,15 @@ def continued(parent: Fit, effects: Sequence[str], workers: Workers) -> list[Fit
 
 
 def helps_at_once(parent: Fit, effect: str, gain: float) -> bool:
-    """Whether an effect, at one of the sizes that fits begin at, gains so much log-likelihood with nothing refitted but
-    what it has of its own in every trial: quickly told."""
+    """Whether an effect gains `gain` in log-likelihood at one of its start sizes with nothing refitted but its own
+    per-trial parameters: a quick test."""
     problem, vectors, nuisances = one_more(parent, effect)
     begun = (problem.start(values, nuisances) for values in vectors)
     return any(cost_of(problem, start) < parent.cost - gain for start in begun)
 
 
 def _continued(problem: Problem, sizes: Sequence[np.ndarray], nuisances: Sequence[np.ndarray], apart: bool) -> Solution:
-    """From the best size, or from each where the effect has nothing to do as yet and no size tells."""
+    """Fit from the best start size, or if `apart` from each of them, since the effect does nothing at the parent's
+    parameters and the costs at the start do not tell the sizes apart."""
     begun = sorted((problem.start(values, nuisances) for values in sizes), key=lambda start: cost_of(problem, start))
     return min((solve(problem, start, **COARSE) for start in begun[: None if apart else 1]), key=lambda s: s.cost)

@@ -15,7 +15,7 @@ _TRIED = 8  # explanations listed, the best first
 
 
 def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Plain types only; numbers that do not exist (no trial held out) are null."""
+    """The diagnosis in plain types only; undefined numbers, such as an error without held-out trials, are null."""
     d = diagnosis
     return {
         "format": FORMAT,
@@ -79,7 +79,7 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _curve(site: CorrectionSite, learnt: Correction) -> dict[str, Any]:
-    """What is added to a term: a row of values each, at equal intervals from `lower` to `upper` of the variable."""
+    """A learnt curve: for each row the values added to the term, evenly spaced in the variable, `lower` to `upper`."""
     return {
         "site": site.name,
         "term": site.term,
@@ -92,7 +92,7 @@ def _curve(site: CorrectionSite, learnt: Correction) -> dict[str, Any]:
 
 
 def _left(d: Diagnosis) -> dict[str, Any]:
-    """What the named effects leave: `times_floor` is the RMS of what repeats share of it where that is largest."""
+    """What the named effects leave. `times_floor`: RMS of what repeats share, in floors, where that is largest."""
     left = d.left
     return {
         "matters": left.matters,
@@ -116,8 +116,8 @@ def _sides(error: Error | Floor) -> dict[str, Any]:
 
 
 def _share(share: float, d: Diagnosis) -> float | None:
-    """None where the base model leaves no gap on the held-out trials, or none that matters (what is missing was taken
-    up by nuisances): a share of it would say nothing."""
+    """`share`, or None if the base model leaves no gap on the held-out trials, or none that matters (nuisances have
+    absorbed what is missing), so that a share of it is meaningless."""
     return _number(share) if d.remainder_before.matters and d.before.held_out > d.floor.held_out else None
 
 

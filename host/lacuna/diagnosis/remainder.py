@@ -1,9 +1,9 @@
 """Is there anything left in a residual but noise? Structure is what repeats of a condition have in common.
 
-The product of two repeats' residuals, averaged, is the mean square of what they share: noise averages out
-whatever its colour, because it is another in each run. How large that average gets by chance is found by
-a bootstrap: every trial is given a stretch of pure noise, taken from the differences between repeats, in
-which all that is shared cancels. No distribution, whiteness or known noise level is assumed.
+The mean product of two repeats' residuals estimates the mean square of what they share: noise averages out
+whatever its colour, because it is independent between runs. How large that mean gets by chance is found by
+a bootstrap: every trial is replaced by a stretch of pure noise, taken from the differences between repeats,
+in which everything shared cancels. No distribution, whiteness or known noise level is assumed.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from lacuna.estimation.problem import FAILED, SOFT_LIMIT
 from lacuna.system import Channels, Record, System, groups_of_repeats
 
 _DRAWS = 200
-_AT_ONCE = 2_000_000  # samples drawn together
+_AT_ONCE = 2_000_000  # samples drawn at once, to bound memory
 _TAIL = 0.1
 _SURELY = 1.645  # standard deviations: one-sided, 95 %
 
 
 @dataclass(frozen=True)
 class Remainder:
-    """What is left in the residual of a fit.
+    """The structure left in the residual of a fit.
 
-    By (experiment, channel): `shared`, mean square of what repeats share, in units of the floor's variance; `z`, the
-    same in standard deviations of what chance makes of it; `chance`, the probability of so much by chance in any of
-    the channels; `good_enough`, what `shared` may be by the accuracy that the person asked for; `sd`, the standard
-    deviation that chance gives to `shared`. It matters where an experiment's mean over its channels exceeds
-    `relevance`, and is no chance.
+    By (experiment, channel): `shared`, mean square of what repeats share, in units of the floor's variance; `z`, its
+    excess in standard deviations of its distribution under chance; `chance`, the probability of a value as large by
+    chance in any of the channels; `good_enough`, the value of `shared` that the declared accuracy permits; `sd`, the
+    standard deviation of `shared` under chance. It matters if the mean over an experiment's channels exceeds
+    `relevance` and is not due to chance.
     """
 
     shared: Mapping[tuple[str, str], float]
@@ -46,7 +46,7 @@ class Remainder:
 
     @property
     def found(self) -> list[tuple[str, str]]:
-        """Where there is structure, the largest first."""
+        """The (experiment, channel) pairs with significant structure, largest first."""
         found = (key for key, p in self.chance.items() if p < self.policy.chance)
         return sorted(found, key=lambda key: -self.shared[key])
 
@@ -56,20 +56,20 @@ class Remainder:
 
     @property
     def largest(self) -> float:
-        """The largest `shared` that is not chance."""
+        """The largest `shared` among the significant ones; 0 if there are none."""
         return max((self.shared[key] for key in self.found), default=0.0)
 
     @property
     def worst(self) -> float:
-        """The largest multiple of what is relevant in any experiment with structure: above 1 something matters."""
+        """The remainder of the worst experiment with structure, as a multiple of `relevance`: it matters above 1."""
         places = [key for key in self.found if self.shared[key] > self.good_enough[key]]
         return max((self._mean(self.shared, e) / self.policy.relevance for e in {e for e, _ in places}), default=0.0)
 
     @property
     def cannot_tell(self) -> dict[str, float]:
-        """Experiments that may lack what matters for all that these trials tell, though nothing was found: by how much
-        at most, RMS in floors. To say that nothing is missing, what may be has to be less than what matters
-        (equivalence), not only what was found."""
+        """Experiments in which something relevant may be missing though these trials do not show it, each with the
+        upper confidence bound of its size (RMS, in floors), largest first. To conclude that nothing is missing, this
+        bound has to lie below what matters (an equivalence test), not just the estimate."""
         found = {}
         for experiment in {e for e, _ in self.shared} if self.sd else ():
             most = {key: max(shared, 0.0) + _SURELY * self.sd[key] for key, shared in self.shared.items()}
@@ -79,7 +79,7 @@ class Remainder:
         return dict(sorted(found.items(), key=lambda one: -one[1]))
 
     def _mean(self, of: Mapping[tuple[str, str], float], experiment: str) -> float:
-        """What repeats of an experiment share, over all of its channels; what is good enough counts as nothing."""
+        """Mean over an experiment's channels; values within `good_enough` count as 0."""
         each = [v if v > self.good_enough[key] else 0.0 for key, v in of.items() if key[0] == experiment]
         return sum(each) / len(each)
 
@@ -93,7 +93,7 @@ def find_remainder(
     policy: Policy = POLICY,
     seed: int = 0,
 ) -> Remainder:
-    """Test the residuals `scaled` (in standard deviations, one mapping a trial) for structure."""
+    """Test the residuals `scaled` (in standard deviations of the floor, one mapping per trial) for structure."""
     draw = np.random.default_rng(seed)
     shared, z, alone, spread = {}, {}, {}, {}
     for key, conditions in _by_condition(trials, scaled).items():
@@ -112,7 +112,8 @@ def find_remainder(
 
 
 def _of_repeats(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> tuple[float, float, float, float]:
-    """What repeats share, in standard deviations of what chance makes of it, the probability of so much, and these."""
+    """For repeated conditions: `shared`, its z-score, the probability of exceeding it by chance, and its standard
+    deviation under chance."""
     shared, by_chance = _shared(conditions), _by_chance(conditions, draw)
     z = (shared - by_chance.mean()) / max(by_chance.std(), 1e-12)
     return shared, float(z), _exceeded(by_chance, shared), float(by_chance.std())
@@ -121,8 +122,8 @@ def _of_repeats(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> 
 def _of_singles(
     conditions: Sequence[np.ndarray], repeated: Sequence[np.ndarray], samples_per_piece: float
 ) -> tuple[float, float, float, float]:
-    """The same for what was run once: its mean square above the floor, which itself is only as well known as the
-    repeats that it was taken from tell."""
+    """The same for conditions run once, from the mean square above the floor. The variance includes that of the floor,
+    which is known only as well as the repeats it was estimated from allow."""
     samples = np.concatenate([rows[np.isfinite(rows)] for rows in conditions])
     above = float(np.mean(samples**2) - 1)
     of_floor = sum((len(rows) - 1) * _in_common(rows) for rows in repeated)
@@ -132,8 +133,8 @@ def _of_singles(
 
 
 def _by_condition(trials: Sequence[Record], scaled: Sequence[Channels]) -> dict[tuple[str, str], list[np.ndarray]]:
-    """By (experiment, channel) one array (repeats, samples) a condition, of the repeats that have the channel, on the
-    time base of the first of them; NaN where nothing was measured."""
+    """By (experiment, channel), one array of shape (repeats, samples) for each condition, holding the repeats that have
+    the channel, on the time base of the first of them; NaN where nothing was measured."""
     found: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
     z = dict(zip((trial.name for trial in trials), scaled, strict=True))
     for members in groups_of_repeats(trials):
@@ -149,12 +150,12 @@ def _by_condition(trials: Sequence[Record], scaled: Sequence[Channels]) -> dict[
 
 
 def _with_failures(z: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """`z`, where the model could not predict what was measured as bad as in a fit."""
+    """`z` with the same penalty as in a fit at measured samples that the model could not predict."""
     return np.where(np.isfinite(measured) & ~np.isfinite(z), FAILED, z)
 
 
 def _in_common(rows: np.ndarray) -> float:
-    """Samples that two repeats have in common, on average."""
+    """Average number of samples that two repeats have in common."""
     if len(rows) < 2:
         return 0.0
     known = np.isfinite(rows).sum(axis=0)
@@ -177,7 +178,7 @@ def _shared(conditions: Sequence[np.ndarray]) -> float:
 
 
 def _by_chance(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> np.ndarray:
-    """`_shared` of noise alone, `_DRAWS` times: signs, order and places in time of pure noise turned at random."""
+    """Draw `_shared` of noise alone, `_DRAWS` times, from noise traces with random sign, order and time shift."""
     differences = [(rows[a] - rows[b]) / np.sqrt(2) for rows in conditions for a in range(len(rows)) for b in range(a)]
     noise = [known for known in (d[np.isfinite(d)] for d in differences) if known.size]
     total, count = np.zeros(_DRAWS), 0
@@ -193,18 +194,18 @@ def _by_chance(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> n
 
 
 def _exceeded(draws: np.ndarray, value: float) -> float:
-    """Probability that chance exceeds `value`. Beyond the largest tenth of the draws an exponential tail goes on: what
+    """Probability that chance exceeds `value`, with an exponential tail fitted to the largest tenth of the draws: what
     walks share by chance is far from normal, since each has few independent errors."""
     threshold = float(np.quantile(draws, 1 - _TAIL))
     if value <= threshold:
         return float(np.mean(draws >= value))
     excess = draws[draws > threshold] - threshold
-    mean = float(excess.mean()) if excess.size else 0.0  # repeats without noise differ by nothing
+    mean = float(excess.mean()) if excess.size else 0.0  # no excess if repeats are identical
     return _TAIL * float(np.exp(-(value - threshold) / max(mean, 1e-12)))
 
 
 def _stretches(noise: Sequence[np.ndarray], shape: tuple[int, ...], draw: np.random.Generator) -> np.ndarray:
-    """Rows of noise, each a trace drawn at random, begun anywhere in it and gone round, in either sign."""
+    """Rows of noise: each a randomly drawn trace, circularly shifted by a random amount, with a random sign."""
     *rows, length = shape
     chosen = draw.integers(len(noise), size=rows)
     place = draw.integers(np.array([len(trace) for trace in noise])[chosen])

@@ -17,9 +17,9 @@ from lacuna.system import Channels, Record
 
 @dataclass(frozen=True)
 class Error:
-    """RMS residual in units of the noise: over the trials that were fitted, those that informed nothing
-    (`Split.final`), those among them whose conditions were never fitted, and the same by experiment (fitted ones where
-    there are no others)."""
+    """RMS residual in units of the noise: over the fitted trials; over the held-out trials, which informed nothing
+    (`Split.final`); over those of them whose conditions were never fitted; and by experiment over the held-out trials,
+    or over the fitted ones if an experiment has no others."""
 
     fitted: float
     held_out: float
@@ -29,7 +29,7 @@ class Error:
 
 @dataclass(frozen=True)
 class Floor:
-    """What repeats of one condition differ by, in the same units: no model can do better."""
+    """RMS difference between repeats of one condition, in the same units: no model can do better."""
 
     fitted: float
     held_out: float
@@ -37,7 +37,7 @@ class Floor:
 
 
 def error_of(fitted: Fit, split: Split) -> Error:
-    """Errors of a fit on its own trials and on trials that it has not seen."""
+    """Errors of a fit on its own trials and on the final trials."""
     known, unseen = by_trial([fitted]), by_trial([evaluate_on(fitted, split.final)])
     held_out, scaled = {trial.experiment for trial in split.final}, known | unseen
     by_experiment: dict[str, list[Channels]] = defaultdict(list)
@@ -62,14 +62,15 @@ def floor_of(fitted: Fit, split: Split) -> Floor:
 
 
 def share_of_gap(before: float, after: float, floor: float) -> float:
-    """Of the gap between a model's error and the floor, RMS all three, the share that is closed: squares add up."""
+    """The share of the gap between the error `before` and the floor that is closed, by mean squares; all arguments are
+    RMS."""
     return (before**2 - after**2) / max(before**2 - floor**2, 1e-12)
 
 
 def excess_over(fits: Sequence[Fit], other: Sequence[Fit], accuracy: Callable[[str, str], float]) -> float:
-    """By what share the mean square of the residuals of fits exceeds that of others on the same trials: in the
-    experiment where it does so most, over all of its channels. Within `accuracy(experiment, channel)` counts as
-    nothing."""
+    """The relative excess of the mean square residual of `fits` over that of `other` on the same trials, averaged over
+    an experiment's channels, for the experiment where it is largest. An excess within `accuracy(experiment, channel)`
+    counts as 0."""
     mine, others = (_mean_squares(one) for one in (fits, other))
     shares: dict[str, list[float]] = defaultdict(list)
     for (experiment, channel), square in mine.items():
@@ -80,7 +81,7 @@ def excess_over(fits: Sequence[Fit], other: Sequence[Fit], accuracy: Callable[[s
 
 
 def _mean_squares(fits: Sequence[Fit]) -> dict[tuple[str, str], float]:
-    """By experiment and channel, of the residuals that there are."""
+    """Mean square residual by experiment and channel, over measured samples; failed predictions count as `FAILED`."""
     squares: dict[tuple[str, str], list[float]] = defaultdict(list)
     for trial, channels in with_residuals(fits):
         for channel, z in channels.items():
@@ -92,8 +93,8 @@ def _mean_squares(fits: Sequence[Fit]) -> dict[tuple[str, str], float]:
 def repeat_differences(
     known: Sequence[Record], held_out: Sequence[Record], residuals: Mapping[str, Channels]
 ) -> tuple[list[Channels], list[Channels]]:
-    """What repeats differ by, over the root of 2 (as large as the noise of one of them): of the pairs among the known
-    trials, and of those with a held-out one. `residuals` by trial."""
+    """Differences between the residuals of repeats, divided by sqrt(2) so that they are as large as the noise of one of
+    them: for the pairs among the known trials, and for the pairs with a held-out trial. `residuals` by trial."""
     names = {t.name for t in held_out}
     known_pairs: list[Channels] = []
     unseen_pairs: list[Channels] = []
@@ -104,23 +105,24 @@ def repeat_differences(
 
 
 def rms(members: Iterable[Channels]) -> float:
-    """Root mean square over trials and channels, each trial's channel counting the same; NaN without any."""
+    """Root mean square over trials and channels, each channel of each trial weighted equally; NaN if there are none."""
     squares = [np.nanmean(z**2) for channels in members for z in channels.values() if np.isfinite(z).any()]
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 
 
 def with_residuals(fits: Iterable[Fit]) -> Iterator[tuple[Record, Channels]]:
-    """Every trial of these fits with its residuals, in standard deviations of the floor."""
+    """Every trial of these fits with its residuals in standard deviations of the floor."""
     return (pair for fit in fits for pair in zip(fit.problem.trials, fit.scaled_residuals(), strict=True))
 
 
 def by_trial(fits: Iterable[Fit]) -> dict[str, Channels]:
-    """The same residuals by the trial's name."""
+    """Residuals in standard deviations of the floor, by the trial's name."""
     return {trial.name: channels for trial, channels in with_residuals(fits)}
 
 
 def failed(every: Iterable[tuple[Record, Channels]]) -> list[str]:
-    """Names of the trials `with_residuals` that a fit cannot predict: no simulation, or one that was given up."""
+    """Names of the trials, as from `with_residuals`, of which a fit cannot predict every measured sample: the
+    simulation failed or was aborted."""
     return [
         trial.name
         for trial, channels in every
@@ -129,7 +131,7 @@ def failed(every: Iterable[tuple[Record, Channels]]) -> list[str]:
 
 
 def at_full_size(fits: Iterable[Fit]) -> tuple[int, float]:
-    """How many of their trials fits cannot predict, and the RMS residual of the others, none compressed."""
+    """The number of trials that the fits cannot predict, and the RMS residual of the others, without compression."""
     every = list(with_residuals(fits))
     return len(failed(every)), rms(channels for _, channels in every)
 

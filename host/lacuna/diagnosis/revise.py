@@ -1,5 +1,5 @@
-"""A choice revised: without the effects that do nothing in it, and with the one that nuisances follow, where it leaves
-nothing in the residual because they take it up."""
+"""Revise a choice: drop effects that do nothing in it, and add an effect that the nuisances have absorbed, so that no
+trace of it is left in the residual."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from lacuna.diagnosis.search import Search, keep_best, reweighed
 from lacuna.diagnosis.workers import Workers
 from lacuna.system import Effect
 
-_FINISHED = 3  # of the most promising, to the end
+_FINISHED = 3  # number of the most promising to fit to convergence
 
 
 def eliminate(case: Case, found: Search, choice: Choice) -> tuple[Search, Choice]:
-    """`choice` without the effects that do nothing in it, the least certain first; and the search, in which a curve
-    that does all the work by itself has taken the place of an effect with that curve."""
+    """Drop the effects that do nothing from `choice`, the least probable first. Returns the search, too, in which a
+    curve that does all the work by itself replaces the freed form of the effect."""
     for effect in sorted(choice.candidate.effects, key=lambda e: choice.probability[e]):
         smaller = _without_absent(case, found, choice, effect)
         if smaller is None and (curve_alone := _replacing(case, found, choice, effect)):
@@ -31,21 +31,21 @@ def eliminate(case: Case, found: Search, choice: Choice) -> tuple[Search, Choice
 
 
 def _without_absent(case: Case, found: Search, choice: Choice, effect: str) -> Candidate | None:
-    """The choice without an effect whose interval holds the value at which it is absent, if that explains no less."""
+    """The choice without an effect whose interval contains its absent value, if that predicts no worse; else None."""
     if not may_be_absent(case.system.effects[effect], case.intervals(choice.candidate)):
         return None
     rest = _others(choice, effect)
     refitted = refitted_without(choice.candidate, rest, case.split)
-    # what was tried of these effects may have ended in another minimum than they have in company
+    # the search may have fitted these effects to another local optimum than they have jointly with `effect`
     smaller = min(refitted, found.with_effects(rest) or refitted, key=lambda c: c.cost)
-    # intervals are wide where fits end in several places; that the effect is there may still be sure
+    # intervals are wide if fits end in several optima; the presence of the effect may still be certain
     return None if Comparison(found, case.policy, case.exceeds).worse(smaller, choice.candidate) else smaller
 
 
 def _replacing(case: Case, found: Search, choice: Choice, effect: str) -> Candidate | None:
-    """The choice with a curve in the place of an effect, where that curve does the effect's work: the effect's formula
-    explains less than half of what the others leave, and beside the curve hardly anything. Whatever acts through the
-    same quantity would do as well."""
+    """The choice with a curve in place of an effect, if the curve does the effect's work: the effect's formula explains
+    less than half of what the others leave, and beside the curve hardly anything, so that any mechanism acting through
+    the same quantity would do as well. None otherwise."""
     rest, freed = _others(choice, effect), choice.freed
     smaller = found.with_effects(rest)
     if smaller is None or freed is None:
@@ -63,14 +63,14 @@ def _others(choice: Choice, effect: str) -> tuple[str, ...]:
 
 
 def may_be_absent(effect: Effect, within: dict[str, tuple[float, float]]) -> bool:
-    """Whether the intervals hold the sizes at which an effect is absent."""
+    """Whether the intervals contain the sizes at which an effect is absent."""
     return all(within[name][0] <= effect.absent <= within[name][1] for name in effect.size_names)
 
 
 def explain_nuisances(case: Case, found: Search, choice: Choice, workers: Workers) -> tuple[Search, Choice]:
-    """`choice` with the effect more that nuisances follow the condition by, if there is one; and the search with what
-    was tried for it. What a condition sets (where its runs begin) may have any value in each, and some effect meets
-    such values roughly; so it has to do so better than by chance."""
+    """Add to `choice` the effect that explains why nuisances follow the condition, if there is one. Returns the search,
+    too, with what was tried. What the conditions themselves set (such as an initial position) may have any value in
+    each, and some effect will roughly match such values; so an effect has to match them better than by chance."""
     followed = case.followed(choice.explanation)
     if not followed or choice.freed or not case.suffices(choice.candidate):
         return found, choice
@@ -78,7 +78,7 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, workers: Worker
     if not parent.fitted.solution.sensitivities:
         parent = reweighed(parent, case.split, found.floor)
     fresh = [name for name in case.system.effects if name not in parent.effects]
-    workers.on_progress(f"asking what {followed[0].nuisance} follows")
+    workers.on_progress(f"looking for an effect behind {followed[0].nuisance}")
     near = continued(parent.fitted, fresh, workers)
     grown = sorted((judge(fitted, case.split, policy, near=parent.checked) for fitted in near), key=lambda c: c.cost)
     promising = [c for c in grown if parent.cost - c.cost > policy.gain][:_FINISHED]

@@ -1,9 +1,9 @@
-"""What an effect could take away from the residual of a fit: the score that ranks everything that may be tried.
+"""Screening: the score that ranks effects by how much of a fit's residual each could remove.
 
-A Lagrange multiplier test asks for a derivative at the absent size, where an effect that clips or slips has none. Here
-a secant stands in its place: the change of the weighted residual by the effect at each of the sizes that fits begin at.
-What the fit's own parameters and nuisances can do is projected off, and by what remains of it an effect is ranked,
-a secant as much as three times as long, none the other way round.
+A Lagrange multiplier (score) test needs a derivative at the absent size, where an effect that clips or slips has none.
+Here secants take its place: the changes of the weighted residual caused by the effect at each of its start sizes. What
+the fit's own parameters and nuisances can reproduce is projected out, and effects are ranked by what the remaining
+secant can remove when it is scaled by a factor between 0 and 3.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.problem import Point, Problem
 
-_LONGEST = 3.0  # times a secant, that it is followed: further it says nothing
-_ABSORBED = 0.02  # a change in the residual of which less than this share is left after the parent's is absorbed
+_LONGEST = 3.0  # largest factor by which a secant is scaled: it is no guide beyond
+_ABSORBED = 0.02  # a change counts as absorbed if less than this share of its norm is left after projection
 
 
 class Promise(NamedTuple):
-    """A set of effects, where a smaller set would go on with it, and the log-likelihood that it promises to gain, once
-    that is known; `suspected`: it is fitted whatever that is."""
+    """A set of effects that may be fitted: its problem, the point from which the fit of a smaller set would continue
+    with it, and the log-likelihood it promises to gain (0 until scored). `suspected`: fitted whatever the gain."""
 
     problem: Problem
     start: Point
@@ -36,17 +36,17 @@ class Promise(NamedTuple):
 
     @property
     def effect(self) -> str:
-        """The one that joins the others."""
+        """The effect that was added last."""
         return self.problem.structure.effects[-1]
 
 
 @dataclass(frozen=True)
 class Screened:
-    """What the data could tell of an effect of typical size.
+    """What the data could reveal about an effect.
 
-    `visible`: standard deviations that it stands out by at the largest size tried after everything that the base can
-    imitate is taken off; `absorbed` if hardly anything is left of it at any size. `gain`: log-likelihood to first
-    order. `wrong_sign`: the share of the residual that it would remove if its bounds allowed the other sign.
+    `visible`: the largest change of the residual over the sizes tried, in standard deviations, after projecting out
+    what the base can imitate; `absorbed`: whether hardly anything is left of it at any size. `gain`: log-likelihood to
+    first order. `wrong_sign`: the share of the residual it would remove if its bounds allowed the opposite sign.
     """
 
     effect: str
@@ -62,9 +62,10 @@ class Screened:
 
 @dataclass(frozen=True)
 class Scores:
-    """Of every secant (an effect more at one of its sizes), shapes (m,): `whole`, the norm of what it changes the
-    residual by; of what is left of that after the parent's own parameters the `squares`, and `push`, its product with
-    what the parent leaves, negative where it takes away from it. `square`: of what the parent leaves."""
+    """The scores of all secants (one added effect at one of its sizes), arrays of shape (m,). `whole`: the norm of the
+    change of the residual; `squares`: the squared norm of that change after projecting out the parent's parameters and
+    nuisances; `push`: the inner product of the projected change with the parent's projected residual, negative if the
+    effect reduces it. `square`: the squared norm of that residual."""
 
     secants: tuple[Promise, ...]
     whole: np.ndarray
@@ -74,17 +75,17 @@ class Scores:
 
     @cached_property
     def _seen(self) -> np.ndarray:
-        """Of which secants enough is left to say anything: of others it is what a straight line misses."""
+        """Which secants are not absorbed; what is left of the others is only their nonlinearity."""
         return np.sqrt(self.squares) > _ABSORBED * self.whole
 
     @cached_property
     def gains(self) -> np.ndarray:
-        """Log-likelihood that each secant would gain, as far as it is followed."""
+        """Log-likelihood that each secant would gain at its best scale factor."""
         far = np.where(self._seen, np.clip(-self.push / self.squares, 0.0, _LONGEST), 0.0)
         return -(far * self.push + 0.5 * far**2 * self.squares)
 
     def singles(self) -> list[Promise]:
-        """Each effect at its best size, the most promising first."""
+        """Each effect at its best size, most promising first."""
         best: dict[str, int] = {}
         for k, secant in enumerate(self.secants):
             if secant.effect not in best or self.gains[k] > self.gains[best[secant.effect]]:
@@ -93,19 +94,19 @@ class Scores:
         return sorted(found, key=lambda one: -one.gain)
 
     def screened(self) -> tuple[Screened, ...]:
-        """What the data could tell of each effect."""
+        """What the data could reveal about each effect."""
         found, left = [], np.sqrt(self.squares)
         for name in dict.fromkeys(secant.effect for secant in self.secants):
             mine = np.array([k for k, secant in enumerate(self.secants) if secant.effect == name])
             absorbed = not self._seen[mine].any()
-            least = mine[0]  # the smallest size tells of a derivative
+            least = mine[0]  # the smallest size is closest to a derivative
             away = max(self.push[least], 0.0) ** 2 / (self.squares[least] * max(self.square, 1e-300))
             found.append(Screened(name, float(left[mine].max()), absorbed, float(self.gains[mine].max()), float(away)))
         return tuple(found)
 
 
 def score(parent: Fit, effects: Sequence[str], workers: Workers) -> Scores:
-    """What each of `effects` could take away from what `parent` leaves, at each of its sizes."""
+    """Score how much of the residual of `parent` each of `effects` could remove, at each of its start sizes."""
     basis, remaining = remaining_after(parent)
     reference = np.concatenate(parent.problem.residuals(parent.solution.point))
     jobs = [one_more(parent, effect) for effect in effects]
@@ -125,14 +126,14 @@ def score(parent: Fit, effects: Sequence[str], workers: Workers) -> Scores:
 def _moved(
     problem: Problem, sizes: Sequence[np.ndarray], nuisances: Sequence[np.ndarray]
 ) -> tuple[list[Point], list[np.ndarray]]:
-    """Where a fit would begin at each size, and the residuals there."""
+    """The starting point of a fit for each size, and the residuals there."""
     begun = [problem.start(values, nuisances) for values in sizes]
     return begun, [np.concatenate(problem.residuals(start)) for start in begun]
 
 
 def remaining_after(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """An orthonormal basis, (n, q), of what the fit's parameters and nuisances can move the residuals by, and the
-    residuals, (n,), less that."""
+    """An orthonormal basis, shape (n, q), of the changes that the fit's parameters and nuisances can make to the
+    residuals, and the residuals, shape (n,), with their projection on it removed."""
     problem, point = fitted.problem, fitted.solution.point
     every = range(len(fitted.structure.names))
     taken = fitted.solution.sensitivities or problem.jacobians(point, every, problem.first_steps())
@@ -147,7 +148,7 @@ def _orthonormal(matrix: np.ndarray) -> np.ndarray:
     kept = matrix[:, norms > 0] / norms[norms > 0]
     if kept.shape[1] == 0:
         return np.zeros((matrix.shape[0], 0))
-    # by the Gram matrix: the columns are few and the rows many
+    # from the Gram matrix, since there are few columns and many rows
     values, vectors = np.linalg.eigh(kept.T @ kept)
     good = values > 1e-10 * values[-1]
     return kept @ (vectors[:, good] / np.sqrt(values[good]))

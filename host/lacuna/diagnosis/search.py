@@ -1,4 +1,4 @@
-"""Search over sets of effects: scored, raced, and scored again on the best of them."""
+"""Search over sets of effects: score them, race the most promising, and score further effects on top of the best."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from lacuna.estimation.solve import cost_of
 from lacuna.system import Effect
 
 LARGEST_SET = 3
-_RACED = {1: 6, 2: 6, 3: 4}  # sets in the race, by their size,
-_FINISHED = {1: 3, 2: 3, 3: 1}  # and of these fitted to the end
-_PARENTS, _JOINED = 2, 3  # of the best sets, those that larger ones grow from, and that are joined
+_RACED = {1: 6, 2: 6, 3: 4}  # number of sets raced, by set size,
+_FINISHED = {1: 3, 2: 3, 3: 1}  # and of these the number fitted to convergence
+_PARENTS, _JOINED = 2, 3  # number of best sets that larger ones grow from, and that are joined in pairs
 _REWEIGHED_ITERATIONS = 5
-_LEAST = 3.0  # log-likelihood: gaining less, an effect was not seen
+_LEAST = 3.0  # log-likelihood: an effect that gains less counts as not seen
 
 
 @dataclass(frozen=True)
 class Search:
     """Every explanation that was fitted, all against the same `floor`, and the screening of the library. `freed`: the
-    best of each size again, with the curve that helps most where its own mechanisms act (or that curve alone, where it
-    does their work)."""
+    best set of each size with the learnt curve that helps most where its own mechanisms act (or without the mechanism,
+    if the curve alone does its work)."""
 
     base: Candidate
     floor: NoiseFloor
@@ -44,12 +44,12 @@ class Search:
 
     @property
     def unseen(self) -> list[str]:
-        """Effects that the data would hardly show: at their typical size, nor at any other that was tried."""
+        """Effects that the data would hardly show, neither at their typical size nor at any other size tried."""
         told = {c.effects for c in self.tried if self.base.cost - c.cost > _LEAST}
         return [s.effect for s in self.screened if not s.detectable and (s.effect,) not in told]
 
     def freed_form(self, candidate: Candidate) -> Candidate | None:
-        """The same effects in a form of their own, where that explains more."""
+        """The same effects in freed form, if that explains more; otherwise None."""
         return next((c for c in self.freed if c.effects == candidate.effects and c.cost < candidate.cost), None)
 
 
@@ -61,9 +61,9 @@ def search(
     workers: Workers,
     keep: Callable[[Sequence[Candidate]], None] = lambda _: None,
 ) -> Search:
-    """Race single effects, then pairs, then sets of three, until one is `enough(candidate)` or none promises to take
-    its share away. The best of each size is tried in a form of its own, too, before another effect joins it. `keep` is
-    called with what there is, in case that somebody stops the search."""
+    """Race single effects, then pairs, then sets of three, until a set satisfies `enough(candidate)` or no larger set
+    promises to remove its share of what is left. Before another effect is added to the best set of a size, the set is
+    also tried in freed form. `keep` is called with every batch of candidates, so that they survive an interruption."""
     split, floor = case.split, first.fitted.problem.floor
 
     def raced(parent: Candidate, promises: Sequence[Promise]) -> list[Candidate]:
@@ -75,11 +75,11 @@ def search(
     freed: list[Candidate] = []
     found = raced(first, _singles(case, scores))
     if better := led_out(first, found, split):
-        workers.on_progress("the base model was in a wrong minimum: from the better one")
+        workers.on_progress("the base model was in a local optimum: continuing from a better one")
         if enough(better):
             return Search(better, floor, (better, *found), scores.screened())
         scores, tried[frozenset()] = score(better.fitted, list(case.system.effects), workers), better
-        begun = {one.effects for one in found}  # cold: they owe nothing to the base model
+        begun = {one.effects for one in found}  # they began cold, so the base model's optimum did not affect them
         found += raced(better, [e for e in _singles(case, scores) if e.problem.structure.effects not in begun])
     keep_best(tried, found)
     for size in range(1, LARGEST_SET + 1):
@@ -107,8 +107,8 @@ def search(
 
 
 def until_now(base: Candidate, kept: Sequence[Candidate], split: Split) -> Search:
-    """What a search that was stopped would have returned: of what it has `kept`, the best candidate for each set, all
-    against the latest floor."""
+    """The result of an interrupted search: for each set of effects the best of the `kept` candidates, all against the
+    latest floor."""
     floor = (kept[-1] if kept else base).fitted.problem.floor
     tried: dict[frozenset[str], Candidate] = {}
     keep_best(tried, (c if c.fitted.problem.floor is floor else reweighed(c, split, floor) for c in (base, *kept)))
@@ -118,7 +118,7 @@ def until_now(base: Candidate, kept: Sequence[Candidate], split: Split) -> Searc
 
 
 def keep_best(tried: dict[frozenset[str], Candidate], found: Iterable[Candidate]) -> None:
-    """Put what was found among what was `tried`, by its effects, where it is the best of these."""
+    """Add `found` to `tried`, keeping the cheapest candidate for each set of effects."""
     for one in found:
         same = frozenset(one.effects)
         tried[same] = min(tried.get(same, one), one, key=lambda c: c.cost)
@@ -129,24 +129,25 @@ def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate
 
 
 def _singles(case: Case, scores: Scores) -> list[Promise]:
-    """The effects that promise most, those of which a score says little, and the suspected ones."""
+    """The effects with the best scores, those that a score may miss, and the suspected ones."""
     library = case.system.effects
     singles = (one._replace(suspected=one.effect in case.suspected) for one in scores.singles())
     return [one for rank, one in enumerate(singles) if rank < _RACED[1] or _blind(library[one.effect]) or one.suspected]
 
 
 def _blind(effect: Effect) -> bool:
-    """Whether a score may miss an effect: with values of its own in every trial, or with nothing to do as yet."""
+    """Whether a score may miss an effect: it has values of its own in every trial or a frequency, or it does nothing at
+    the parent's parameters (`Effect.apart`)."""
     return bool(effect.own or effect.apart or effect.frequency)
 
 
 def _larger(
     case: Case, tried: dict[frozenset[str], Candidate], ranked: Sequence[Candidate], workers: Workers
 ) -> list[Promise]:
-    """Sets of one effect more, those first that promise to cost least: grown from the best, of the very best with what
-    a score may miss and what is suspected, too; and of what the best have, two and two, since a limit that another one
-    has taken the place of promises nothing beside it. None if none promises to take its share of what the best leaves
-    away."""
+    """Sets with one more effect, the most promising first. They grow from the best sets by score; the very best one
+    also grows by suspected effects and by those that do nothing yet (`Effect.apart`). The best sets are also joined in
+    pairs, since an effect whose place another has taken, such as a limit, promises nothing beside it. Empty if no set
+    promises to remove its share of what the best leaves."""
     base, best, library = tried[frozenset()], ranked[0], case.system.effects
     size, always, offers = len(best.effects) + 1, [], []
     for parent in ranked[:_PARENTS]:
@@ -173,7 +174,7 @@ def _larger(
 
 
 def with_derivatives(candidate: Candidate) -> Candidate:
-    """Some may have come up as they were weighed again, and have none."""
+    """The candidate with derivatives, computed if it has none because it was only reweighed without iterations."""
     if candidate.fitted.solution.sensitivities:
         return candidate
     fitted = reweigh(candidate.fitted, candidate.fitted.problem.floor, max_iterations=_REWEIGHED_ITERATIONS)
@@ -181,8 +182,8 @@ def with_derivatives(candidate: Candidate) -> Candidate:
 
 
 def led_out(base: Candidate, singles: Sequence[Candidate], split: Split) -> Candidate | None:
-    """The base model from where a fit with one effect leads it, whichever is nearest, if that explains more: then what
-    these seemed to explain was the base fit's failure, or some of it."""
+    """The base model refitted from the single-effect fit at whose parameters it costs least, if that explains more than
+    `base` does: part of what the effects seemed to explain was then due to the base fit's local optimum."""
     problem = base.fitted.problem
     costs: dict[Candidate, float] = {}
     for one in singles:
@@ -198,14 +199,14 @@ def led_out(base: Candidate, singles: Sequence[Candidate], split: Split) -> Cand
 def _against(
     tried: dict[frozenset[str], Candidate], size: int, split: Split, floor: NoiseFloor, reach: float
 ) -> dict[frozenset[str], Candidate]:
-    """Everything tried against another floor; what may still win, and the base model, fitted again."""
+    """Everything tried against another floor; the base model and what may still win are refitted."""
     ranked = _ranked(tried, size)
     near, leading = reach * ranked[0].cost, ranked[:_PARENTS]
     return {s: reweighed(c, split, floor, thoroughly=not s or c in leading or c.cost < near) for s, c in tried.items()}
 
 
 def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thoroughly: bool = True) -> Candidate:
-    """The same explanation against another floor, fitted from where it stands if it is to be done thoroughly."""
+    """The explanation against another floor; `thoroughly`: refitted from its current point, not just re-evaluated."""
     steps = _REWEIGHED_ITERATIONS if thoroughly else 0
     fitted = reweigh(candidate.fitted, floor, max_iterations=steps)
     return judge(fitted, split, candidate.policy, near=candidate.checked)

@@ -1,4 +1,4 @@
-"""Where the residual is and what it depends on, in words and numbers."""
+"""The signature of a residual: where it is and what it depends on, in words and numbers."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from lacuna.estimation.fit import Fit
 from lacuna.system import Record
 
 _BINS = 15
-_WORTH_NAMING = 0.08  # share of a residual's square that a dependence must predict in other runs
+_WORTH_NAMING = 0.08  # share of the residual's mean square that a dependence must predict in other runs
 _MOST_NAMED = 3
-_VISIBLE = 4.0  # standard deviations of structure by chance
+_VISIBLE = 4.0  # standard deviations under chance beyond which structure is listed
 _SHARE_OF_LARGEST = 0.05
 
 
@@ -33,7 +33,7 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Signature:
-    """`experiments` with structure, worst first; `depends_on`, strongest first; `text`: one paragraph."""
+    """`experiments` with structure, worst first; quantities it `depends_on`, strongest first; `text`: a paragraph."""
 
     experiments: tuple[str, ...]
     depends_on: tuple[str, ...]
@@ -42,8 +42,8 @@ class Signature:
 
 
 def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *, unshared: str = "") -> Signature:
-    """The signature of the residual of `fitted`, given its test for structure, the drifts over the session, and whether
-    repeats differ by what is no noise."""
+    """Describe the residual of `fitted`, given its test for structure and the drifts over the session. `unshared`: a
+    sentence on structure that repeats do not demonstrably share, or empty."""
     visible = {*remainder.found, *(key for key, z in remainder.z.items() if z > _VISIBLE)}
     least = _SHARE_OF_LARGEST * remainder.largest
     places = sorted(
@@ -64,7 +64,7 @@ _Rows = list[tuple[np.ndarray, Mapping[str, np.ndarray]]]
 
 
 def _gather(fitted: Fit) -> dict[tuple[str, str], _Rows]:
-    """By (experiment, channel): of each trial the scaled residual and the quantities that it may depend on."""
+    """By (experiment, channel), each trial's scaled residual and the quantities that it may depend on."""
     system = fitted.structure.system
     rows: dict[tuple[str, str], _Rows] = defaultdict(list)
     predictions = fitted.predictions()
@@ -82,7 +82,8 @@ def _finite(quantities: Mapping[str, np.ndarray], trial: Record) -> dict[str, np
 
 
 def _dependence(key: tuple[str, str], rows: _Rows) -> Dependence | None:
-    """The quantity, or the pair of them, whose binned mean made from every other trial predicts the rest best."""
+    """The quantity or pair of quantities whose binned mean over every other trial best predicts the remaining trials;
+    None if it predicts too little."""
     names = [n for n in rows[0][1] if all(n in quantities for _, quantities in rows)]
     if len(rows) < 2 or not names:  # without names the system offers nothing that a residual may depend on
         return None
@@ -124,20 +125,21 @@ def _edges(samples: np.ndarray) -> np.ndarray:
 def _placed(
     rows: _Rows, names: Sequence[str], edges: Sequence[np.ndarray]
 ) -> Iterator[tuple[np.ndarray, tuple[np.ndarray, ...]]]:
-    """Of each trial the residuals that were measured, and the cells that they lie in."""
+    """Measured residuals of each trial, and the cells they fall into."""
     for z, quantities in rows:
         known = np.isfinite(z)
         yield z[known], tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
 def _cannot_tell(remainder: Remainder, experiments: Sequence[str]) -> str:
-    """Where that nothing was found does not say that nothing is missing."""
+    """A caveat for experiments in which finding nothing does not show that nothing is missing; empty if there are
+    none."""
     if not (most := remainder.cannot_tell):
         return ""
     each = ", ".join(f"{size:.1f} x the floor{within(e, experiments)}" for e, size in list(most.items())[:3])
     return (
-        f" That does not say that nothing is missing: as much as {each} could not be told from chance."
-        " More repeats would tell."
+        f" That does not prove that nothing is missing: up to {each} could not be distinguished from chance."
+        " More repeats would narrow this down."
     )
 
 

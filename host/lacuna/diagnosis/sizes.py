@@ -1,4 +1,4 @@
-"""Where fits with one more effect begin: at a grid of sizes, of either sign, at frequencies of the residual."""
+"""Starting points of fits with one more effect: a grid of sizes of either sign, at peak frequencies of the residual."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
 from lacuna.system import Effect
 
-_PEAKS = 3  # of the residual's spectrum that a frequency begins at
+_PEAKS = 3  # number of peaks of the residual's spectrum at which a frequency parameter starts
 
 
 def grown(parent: Fit, effect: str) -> Problem:
-    """The problem of a fit with an effect more, on the same trials against the same floor."""
+    """The problem of a fit with one more effect, on the same trials and against the same floor."""
     structure, problem = parent.structure, parent.problem
     return Problem(
         Structure(structure.system, (*structure.effects, effect)), problem.trials, problem.floor, problem.view
@@ -24,7 +24,7 @@ def grown(parent: Fit, effect: str) -> Problem:
 
 
 def starts(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
-    """Starting vectors: the parent's values, the effect at a grid of sizes of either sign."""
+    """Starting vectors: the parent's values with the effect at a grid of sizes of either sign."""
     described = structure.system.effects[effect]
     base = structure.parted(starting_point(parent, structure), effect)
     vectors = [v for factor in described.start_factors for v in sized(structure, base, effect, factor)]
@@ -34,13 +34,13 @@ def starts(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
 
 
 def one_more(parent: Fit, effect: str) -> tuple[Problem, list[np.ndarray], Sequence[np.ndarray]]:
-    """What a fit with an effect more begins with: its problem, the starting vectors, and the parent's nuisances."""
+    """The inputs of a fit with one more effect: its problem, starting vectors, and the parent's nuisances."""
     problem = grown(parent, effect)
     return problem, starts(parent, problem.structure, effect), parent.solution.point.nuisances
 
 
 def sized(structure: Structure, base: np.ndarray, effect: str, factor: float) -> list[np.ndarray]:
-    """The vector `base` with an effect at `factor` times its typical size, of either sign."""
+    """Copies of `base` with an effect at `factor` times its typical size, of either sign where its bounds allow."""
     described = structure.system.effects[effect]
     parameters = described.parameters[: described.sizes]
     at, vectors = [structure.names.index(name) for name in described.size_names], []
@@ -54,13 +54,13 @@ def sized(structure: Structure, base: np.ndarray, effect: str, factor: float) ->
 
 
 def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndarray) -> list[np.ndarray]:
-    """`vector` with the effect's frequency at each of the residual's most prominent ones."""
+    """Copies of `vector` with the effect's frequency at each of the residual's most prominent frequencies."""
     index = structure.names.index(f"{effect.name}.{effect.frequency}")
     parameter = structure.parameters[index]
     problem = parent.problem
     found = []
     prominent = peaks(problem.trials, parent.scaled_residuals(), parameter.lower, parameter.upper, _PEAKS)
-    for frequency in prominent or [parameter.value]:  # a range that no record resolves has no peaks
+    for frequency in prominent or [parameter.value]:  # there are no peaks in a range that no record resolves
         moved = vector.copy()
         moved[index] = frequency
         found.append(moved)
@@ -68,7 +68,7 @@ def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndar
 
 
 def _signs(effect: Effect) -> list[tuple[float, ...]]:
-    """On which sides of their absent values the sizes may be."""
+    """The sign combinations to try for the sizes, relative to their absent values."""
     both_ways = all(p.lower < effect.absent < p.upper for p in effect.parameters[: effect.sizes])
     positive = (1.0,) * effect.sizes
     return [positive, tuple(-s for s in positive)] if both_ways else [positive]

@@ -1,4 +1,4 @@
-"""Frequencies at which a residual swings: where an effect that oscillates can begin to be fitted."""
+"""Peak frequencies of a residual: starting values for fits of an oscillating effect."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from scipy.ndimage import median_filter
 from lacuna.estimation.sampling import evenly, sample_period
 from lacuna.system import Channels, Record
 
-_CELLS_A_LINE = 3  # grid cells, at least, within the width of a line in the longest record
+_CELLS_A_LINE = 3  # minimum number of grid cells within a spectral line's width in the longest record
 _MOST_CELLS = 200_000
-_LOCAL = 100  # cells: the background that a peak must stand out from is taken over so many
-_LONGEST = 20.0  # a trial's power at a frequency counts at most so many times its background
+_LOCAL = 100  # cells over which the background is taken that a peak must stand out from
+_LONGEST = 20.0  # cap on a trial's power at a frequency, in multiples of its background
 
 
 def peaks(
     trials: Sequence[Record], scaled: Sequence[Channels], lower_hz: float, upper_hz: float, count: int
 ) -> list[float]:
-    """The `count` most prominent frequencies [Hz] of the residuals `scaled`, pooled over trials and channels, each
-    weighed by its own background."""
+    """The `count` most prominent frequencies [Hz] of the residuals `scaled`, pooled over trials and channels, the power
+    of each divided by its own background."""
     from scipy.signal import find_peaks  # slow to import
 
     resolution_hz = _resolution_hz(max(trial.time_s[-1] - trial.time_s[0] for trial in trials), upper_hz - lower_hz)
@@ -40,7 +40,7 @@ def peaks(
 
 
 def _resolution_hz(longest_s: float, range_hz: float) -> float:
-    """The largest of 1, 2, 5, 10 ... mHz (and so on) that divides a line's width in the longest record."""
+    """Grid spacing: the largest of 1, 2 or 5 times a power of ten that resolves a line of the longest record."""
     finest = 1.0 / (_CELLS_A_LINE * longest_s)
     decade = 10.0 ** np.floor(np.log10(finest))
     largest = max(digit for digit in (1.0, 2.0, 5.0) if digit * decade <= finest)
@@ -48,7 +48,7 @@ def _resolution_hz(longest_s: float, range_hz: float) -> float:
 
 
 def _power(residual: np.ndarray, sample_s: float, frequencies: np.ndarray, resolution_hz: float) -> np.ndarray:
-    """Power of a tapered trace at `frequencies`."""
+    """Power spectrum of the tapered trace at `frequencies`."""
     tapered = (residual - residual.mean()) * np.hanning(len(residual))
     size = 1 << int(np.ceil(np.log2(max(len(residual), 1.0 / (resolution_hz * sample_s)))))
     return np.interp(frequencies, np.fft.rfftfreq(size, sample_s), np.abs(np.fft.rfft(tapered, size)) ** 2)

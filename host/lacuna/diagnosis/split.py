@@ -1,4 +1,4 @@
-"""Which trials are fitted, which choose between explanations, and which are looked at only at the end."""
+"""Which trials are fitted, which choose between explanations, and which are used only for the final test."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from lacuna.system import Record, groups_of_repeats
 
 @dataclass(frozen=True)
 class Split:
-    """`fit`: fitted. `select`: further repeats of the same conditions, and `unseen`: repeats of whole conditions that
-    are never fitted; both choose between explanations. `final`: repeats of either kind (without repeats: trials) that
-    inform nothing, and are the test."""
+    """`fit`: trials to fit. `select`: further repeats of the same conditions; `unseen`: repeats of whole conditions
+    that are never fitted; both choose between explanations. `final`: repeats of either kind (without repeats: single
+    trials) that inform no choice and serve as the test."""
 
     fit: tuple[Record, ...]
     select: tuple[Record, ...]
@@ -22,17 +22,17 @@ class Split:
 
     @property
     def known(self) -> tuple[Record, ...]:
-        """What the final explanation is fitted to."""
+        """The trials that the final explanation is fitted to."""
         return self.fit + self.select
 
     @property
     def judging(self) -> tuple[Record, ...]:
-        """What explanations are compared on besides the trials that they are fitted to."""
+        """The trials on which explanations are compared, besides the fitted ones."""
         return self.select + self.unseen
 
     @property
     def not_fitted(self) -> tuple[Record, ...]:
-        """Everything that the final explanation is not fitted to, whether it informed a choice or not."""
+        """The trials that the final explanation is not fitted to, whether they informed a choice or not."""
         return self.unseen + self.final
 
     @property
@@ -43,7 +43,7 @@ class Split:
 
     @property
     def repeats(self) -> tuple[Record, ...]:
-        """The final trials of conditions of which other repeats were fitted."""
+        """The final trials of conditions with other repeats that were fitted."""
         names = {t.name for t in self.conditions}
         return tuple(t for t in self.final if t.name not in names)
 
@@ -51,14 +51,16 @@ class Split:
 def split_trials(
     trials: Sequence[Record], spare: Collection[tuple[str, Hashable]] = (), test: Collection[str] = ()
 ) -> Split:
-    """Split by whole trials; deterministic. `test`: names of the trials that are `final`, if the person says which;
-    what would be otherwise selects then. Raises MisuseError where the others cannot be fitted and judge.
+    """Split by whole trials; deterministic. `test`: names of the trials to be `final`, if the user chooses them; those
+    that would be `final` otherwise then go to `select`. Raises MisuseError (TooLittleDataError) if the others do not
+    suffice for fitting and judging.
 
-    `spare`: (experiment, condition) of those that are never fitted: the last repeat of each is `final`, the others are
-    `unseen`. Of three or more repeats of any other condition a third goes to `final` and a third to `select`, which
-    rotates from condition to condition, so that no part has all the early or all the late runs of a session; of two,
-    one goes to either in turn; of trials without repeats every fifth is `final` and another fifth selects. None is
-    `final` if nothing else could judge, or if it alone has a channel.
+    `spare`: (experiment, condition) pairs that are never fitted: the last repeat of each is `final`, the others are
+    `unseen`. Of three or more repeats of any other condition a third goes to `final` and a third to `select`, rotating
+    from condition to condition, so that no part gets all the early or all the late runs of a session. Of two repeats
+    one is fitted and the other goes to `final` and `select` in turn. Of trials without repeats one in five is `final`
+    and another one in five goes to `select`. No trial is `final` if nothing else could judge, or if it is the only one
+    with a channel.
     """
     parts: dict[str, list[Record]] = {"fit": [], "select": [], "unseen": [], "final": []}
     pairs = singles = 0
@@ -95,18 +97,18 @@ def split_trials(
 
 
 def _check_test(fit: list[Record], select: list[Record], unseen: list[Record], final: list[Record]) -> None:
-    """A test informs nothing, so others have to be fitted and to judge, and to tell how noisy its channels are."""
+    """The test informs nothing, so other trials are needed to fit, to judge, and to estimate its channels' noise."""
     if not fit or not (select or unseen):
         raise TooLittleDataError(
-            f"test names {listed(t.name for t in final)}: of the other records none is left to"
-            f" {'judge explanations by' if fit else 'be fitted'}. Leave one of them out of the test, or measure more."
+            f"test names {listed(t.name for t in final)}: none of the other records is left to"
+            f" {'judge explanations' if fit else 'fit'}. Leave one of them out of the test, or measure more."
         )
     known = {channel for trial in (*fit, *select, *unseen) for channel in trial.channels}
     for trial in final:
         if alone := trial.channels.keys() - known:
             raise MisuseError(
-                f"test names {trial.name}, but no other record has {listed(sorted(alone))}, to say how noisy it is:"
-                " leave it out of the test."
+                f"test names {trial.name}, but no other record has {listed(sorted(alone))}, which is needed to estimate"
+                " its noise: leave it out of the test."
             )
 
 

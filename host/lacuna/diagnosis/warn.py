@@ -1,4 +1,4 @@
-"""What speaks against a verdict, though it stands, or against its fit: one sentence each."""
+"""Warnings: reasons to doubt a verdict or its fit, each in a sentence or two."""
 
 from __future__ import annotations
 
@@ -17,70 +17,69 @@ from lacuna.estimation.structure import is_learnt
 from lacuna.estimation.uncertainty import Estimate, pieces_of, uncertainty
 
 _SURELY = 4.0  # standard deviations
-_APART = 3.0  # times the noise: what is left of repeats hardly differs by as much, unless their predictions do
-_NEAR_LIMIT = 3.5  # standard deviations from a nuisance's mean: it probably absorbs model error
+_APART = 3.0  # times the noise: residuals of repeats hardly differ by as much unless their predictions do
+_NEAR_LIMIT = 3.5  # standard deviations from its mean beyond which a nuisance probably absorbs model error
 
 
 def not_predicted(found: Fit, split: Split, error: Error, floor: Floor, policy: Policy) -> list[str]:
-    """Of a verdict that nothing is missing: records that were not fitted, and are predicted worse than that beyond
-    chance."""
+    """For the verdict `none`: a warning if held-out records are predicted significantly worse than the noise."""
     pieces = sum(pieces_of(trial, found.problem.floor) for trial in split.final)
     above = error.held_out**2 - floor.held_out**2 if split.final else 0.0
     if above <= policy.relevance * floor.held_out**2 or above < _SURELY * floor.held_out**2 * (2.0 / pieces) ** 0.5:
         return []
     return [
-        f"Records that were not fitted ({listed([trial.name for trial in split.final])}) are predicted to"
-        f" {error.held_out:.2f} times the noise, those fitted to {error.fitted:.2f}: something may be missing there."
+        f"The test records ({listed([trial.name for trial in split.final])}) are predicted with an error of"
+        f" {error.held_out:.2f} times the noise, fitted ones with {error.fitted:.2f}: something may be missing there."
     ]
 
 
 def repeats_apart(floor: Floor) -> list[str]:
-    """Of repeats that were measured alike and are predicted differently: what they differ by is taken for noise, and
-    hides what is missing."""
+    """A warning if residuals of repeats differ far more than the noise, which happens when repeats measured alike are
+    predicted differently: the difference is taken for noise and hides what is missing."""
     most = max(floor.fitted, floor.held_out)
     if not most > _APART:
         return []
     return [
-        f"What the model leaves of one repeat differs from what it leaves of another by {most:.3g} times the noise, and"
-        " what repeats differ by passes for noise: was one recorded otherwise, or does the model count samples where"
-        " times differ?"
+        f"Residuals of repeats differ by {most:.3g} times the noise, and what repeats differ by is taken for noise: was"
+        " one of them recorded differently, or does the model count samples although sampling times differ?"
     ]
 
 
 def but_too_little(choice: Choice, split: Split, tested: float | None, policy: Policy) -> list[str]:
-    """Of a choice that predicts better, and is still not named. `tested`: what it closes on the final trials."""
+    """A warning for effects that predict better and are still not named. `tested`: the share of the gap that they close
+    on the final trials."""
     named = " and ".join(choice.candidate.effects)
     if tested is not None and tested < policy.half:
         final = listed([trial.name for trial in split.final])
-        how = "worse than without" if tested < 0.0 else f"by only {100 * tested:.0f} % of what is missing there"
+        how = "get worse" if tested < 0.0 else f"improve by only {100 * tested:.0f} % of what is missing there"
         return [
-            f"With {named} most records are predicted better, but those that chose nothing ({final}) {how}: it is not"
-            " named. Do they differ in something that is not told?"
+            f"With {named} most records are predicted better, but the test records ({final}) {how}: it is not named."
+            " Do these records differ in some setting that was not declared?"
         ]
-    return [f"{named}: a better prediction beyond doubt, but too little of what is missing to be named."]
+    return [f"{named} predicts better beyond doubt, but explains too little of what is missing to be named."]
 
 
 def doubts(choice: Choice, split: Split, tested: float | None) -> list[str]:
-    """Of named effects: an explanation of more weight, and final trials that tell little. `tested`: what the
-    effects close there, if there is a gap."""
+    """Warnings for named effects: a larger explanation has more weight, or there is only one final trial. `tested`: the
+    share of the gap that the effects close on the final trials; None without a gap."""
     said = []
     likeliest, weight = max(choice.weights.items(), key=lambda found: found[1])
     if weight > 0.5 and frozenset(likeliest) > frozenset(choice.candidate.effects):
         further = [effect for effect in likeliest if effect not in choice.candidate.effects]
         said.append(
-            f"With {listed(further)}, too, the explanation would have more weight ({weight:.2f}), but that closes too"
-            " little of what is left to be named, or helps too little where nothing was fitted."
+            f"With {listed(further)} added the explanation would have more weight ({weight:.2f}), but that closes too"
+            " little of what is left to be named, or helps too little on records that were not fitted."
         )
     if tested is not None and len(split.final) == 1:
-        said.append(f"One record alone informed no choice, {split.final[0].name}: the shares of the gap rest on it.")
+        said.append(f"The shares of the gap rest on a single test record, {split.final[0].name}.")
     return said
 
 
 def perhaps_absent(names: Sequence[str]) -> list[str]:
-    """Of named effects with an interval that says little."""
+    """Warnings for named effects whose interval contains the size at which they are absent."""
     return [
-        f"The interval of {name} holds the size at which it is absent: conditions disagree about how large it is,"
-        " though without it what was not fitted is predicted worse."
+        f"The interval of {name} contains the size at which it is absent: conditions disagree about its size, though"
+        " without it records that were not fitted are predicted worse."
         for name in names
     ]
 
@@ -92,13 +91,13 @@ def follow_in_words(followed: Sequence[Followed]) -> str:
 
 
 def followed_by_nothing(followed: Sequence[Followed]) -> list[str]:
-    """A caution where nuisances follow the condition and nothing explains it."""
+    """A warning if nuisances follow the condition and no effect explains it."""
     if not followed:
         return []
     names = listed([one.nuisance for one in followed])
     return [
-        f"{follow_in_words(followed)}, though runs of one differ. If no condition sets {names}, the model lacks"
-        " something that acts like it."
+        f"{follow_in_words(followed)}, though it is declared to vary between runs. If the conditions do not set"
+        f" {names}, the model lacks something that acts like it."
     ]
 
 
@@ -115,8 +114,8 @@ def _failed(fits: list[Fit]) -> list[str]:
     if not (names := failed(with_residuals(fits))):
         return []
     return [
-        f"The model could not predict {listed(names)}: counted as badly predicted where explanations are compared, left"
-        " out of the errors."
+        f"The model could not predict {listed(names)}: counted as badly predicted when explanations are compared, and"
+        " left out of the errors."
     ]
 
 
@@ -124,7 +123,7 @@ def _parameters(fitted: Fit) -> list[str]:
     known = uncertainty(fitted)
     told = fitted.structure.system.told
     found = [
-        f"{e.name} is at its bound ({_quantity(told(e.name, _bound(fitted, e)), e.unit)}): widen it if it is no"
+        f"{e.name} is at its bound ({_quantity(told(e.name, _bound(fitted, e)), e.unit)}): widen it unless it is a"
         " physical limit."
         for e in known.estimates
         if e.at_bound and e.determined
@@ -134,14 +133,14 @@ def _parameters(fitted: Fit) -> list[str]:
         for e in known.estimates
         if e.implausible and not e.at_bound
     ]
-    # between its data a learnt curve is what its prior makes of it, in any number of directions
+    # where there are no data a learnt curve follows its prior, so any number of its directions are undetermined
     own = [[name for name in direction if not is_learnt(name)] for direction in known.undetermined]
     found += [f"The data hardly determine {_combined(names)}." for names in own if names]
     return list(dict.fromkeys(found))
 
 
 def _strayed(fits: list[Fit]) -> list[str]:
-    """Nuisances far from what is expected, in single trials or, by less, in all of them."""
+    """Warnings for nuisances far from their expected value, in single trials or on average."""
     runs: dict[str, list[NuisanceOfRun]] = {}
     for run in runs_of(fits):
         runs.setdefault(run.nuisance.name, []).append(run)
@@ -149,7 +148,7 @@ def _strayed(fits: list[Fit]) -> list[str]:
     for name, each in runs.items():
         if far := [one.trial.name for one in each if abs(one.away) > _NEAR_LIMIT]:
             found.append(
-                f"{name} is more than {_NEAR_LIMIT:g} standard deviations from what is expected in {listed(far)}: it"
+                f"{name} is more than {_NEAR_LIMIT:g} standard deviations from its expected value in {listed(far)}: it"
                 " probably absorbs model error."
             )
         if abs(sum(one.away for one in each)) > _NEAR_LIMIT * len(each) ** 0.5:
@@ -158,14 +157,14 @@ def _strayed(fits: list[Fit]) -> list[str]:
             unit = each[0].nuisance.unit
             found.append(
                 f"{name} is {_quantity(mean, unit)} on average over {len(each)} trials, where"
-                f" {_quantity(expected, unit)} is expected: declare that, or other runs are predicted worse."
+                f" {_quantity(expected, unit)} is expected: declare that average, or other runs are predicted worse."
             )
     return found
 
 
 def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
-    """A sentence for each effect with one size, absent at a bound, that the residual of `fitted` would push beyond that
-    bound: if to first order it removes more than the policy's share of the residual."""
+    """Warnings for effects that would help only beyond their bounds: those with one size, absent at a bound, that would
+    to first order remove more than the policy's `share` of the residual of `fitted` with the opposite sign."""
     if fitted.structure.sites:  # nothing is grown on a learnt curve
         return []
     system, found = fitted.structure.system, []
@@ -187,7 +186,7 @@ def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
 
 
 def _bound(fitted: Fit, at: Estimate) -> float:
-    """The bound that stopped it; where that is another parameter, the value."""
+    """The bound at which a parameter stopped; its value if the bound is another parameter."""
     parameter = fitted.structure.parameters[fitted.structure.names.index(at.name)]
     if parameter.at_least:
         return at.value

@@ -1,5 +1,5 @@
-"""Who does the work: children of this process, a core each; an executor's workers; or this process itself. And who
-stops it."""
+"""Where the work is done: in forked children, one per core, by an executor's workers, or in this process; and how it
+is interrupted."""
 
 from __future__ import annotations
 
@@ -24,20 +24,21 @@ Answer = TypeVar("Answer")
 
 
 class Workers:
-    """Runs pure functions and says what is being done. Any `concurrent.futures.Executor` will do that can ship a
-    `Problem`, and so its system: threads, processes, dask. Without one, jobs go to forked children if these are allowed
-    (`System.forks`), there is more than one job and more than one core, and this is Linux."""
+    """Runs pure functions in parallel and reports progress. Any `concurrent.futures.Executor` works that can ship a
+    `Problem` and thus its system: threads, processes, dask. Without an executor, jobs run in forked children if
+    `System.forks` permits it, there is more than one job and more than one core, and the platform is Linux."""
 
     def __init__(self, on_progress: OnProgress, executor: Executor | None = None, *, forks: bool = False):
         self.on_progress, self._executor = on_progress, executor
         self._forks = forks and sys.platform == "linux" and not current_process().daemon
 
     def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable[..., Any], jobs: Jobs) -> list[Any]:
-        """`function(*job)` for each of `jobs`, in their order; `names` are the effects, if any, that each is about."""
+        """`function(*job)` for each of `jobs`, in their order. `names`: the effects of each job, for progress messages;
+        empty for the base model."""
         found = []
         with self._working(function, jobs) as results:
             for effects in names:
-                self.on_progress(f"{doing} {' + '.join(effects) or 'nothing'}")
+                self.on_progress(f"{doing} {' + '.join(effects) or 'the base model'}")
                 found.append(next(results))
         return found
 
@@ -55,8 +56,9 @@ class Workers:
 
 @contextmanager
 def _children(function: Callable[..., Any], jobs: Jobs) -> Iterator[Iterator[Any]]:
-    """Results in the jobs' order. A fork has everything that this process has, so that nothing but results is shipped
-    and a system may hold what cannot be. What is interrupted ends at once."""
+    """Yield an iterator over the results in the jobs' order. A forked child inherits this process's memory, so that
+    only results are pickled and a system may hold objects that cannot be. On an exception the children are terminated
+    at once."""
     before = set(active_children())
     pool = ProcessPoolExecutor(min(cores(), len(jobs)), get_context("fork"), _begin, (function, jobs))
     try:
@@ -75,9 +77,9 @@ _work: tuple[Callable[..., Any], Jobs]
 def _begin(function: Callable[..., Any], jobs: Jobs) -> None:
     global _work
     _work = function, jobs
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the parent
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)  # however it ends
+    ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)  # even if the parent is killed
     use_threads(1)
 
 
@@ -87,23 +89,23 @@ def _do(index: int) -> Any:
 
 
 class Stoppable:
-    """A diagnosis in steps that still gives a verdict when it is interrupted: once Ctrl-C has stopped it, every further
-    step gives its short answer, from what was finished by then. `stopped`: whether that has happened."""
+    """Lets a diagnosis still give a verdict when it is interrupted: after Ctrl-C, each remaining step falls back to a
+    short answer based on what was finished by then. `stopped`: whether Ctrl-C was pressed."""
 
     def __init__(self, workers: Workers) -> None:
         self.workers, self.stopped = workers, False
 
     def on_progress(self, what: str) -> None:
-        """Once stopped, nothing: what was said of that stays to be read."""
+        """Report progress, unless stopped: the message about the interruption should stay visible."""
         if not self.stopped:
             self.workers.on_progress(what)
 
     def ask(self, full: Callable[[], Answer], short: Callable[[], Answer], said: str) -> Answer:
-        """The full answer; where it is stopped, `said` is shown, and the answer is short."""
+        """Return the full answer or, if it is or was interrupted, the short one; `said` is shown on interruption."""
         if not self.stopped:
             try:
                 return full()
             except KeyboardInterrupt:
-                self.workers.on_progress(f"stopped: {said} (Ctrl-C again gives up)")
+                self.workers.on_progress(f"stopped: {said} (press Ctrl-C again to abort)")
                 self.stopped = True
         return short()

@@ -1,4 +1,4 @@
-"""Fitting a structure to trials: several starts, equal effort, and whether they agree."""
+"""Fit a structure to trials from several starts with equal effort, and count how many of them agree."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from lacuna.system import Channels, Record, System
 
 _MOST_AGAIN = 40  # iterations with another floor
 
-_SAME_COST = 0.02  # relative: two starts that end within this of each other found the same minimum
-_OPEN = 0.1  # scales
-_FRUITFUL = 1e-3  # of the cost: what a search has to gain for another to follow it
-_CONVERGED = 4e-3  # the same where an RMS error is stated: it is then known to a fifth of a per cent
+_SAME_COST = 0.02  # relative: starts whose costs agree to within this found the same minimum
+_OPEN = 0.1  # scales: tolerance of a bound for a parameter that the data do not determine
+_FRUITFUL = 1e-3  # of the cost: a search that gains less is not followed by another
+_CONVERGED = 4e-3  # the same for a reported RMS error, which is then known to a fifth of a per cent
 _CONVERGED_ITERATIONS, _ROUNDS = 20, 5
 _NUISANCE_ITERATIONS = 4
 _NONE = np.zeros(0)
@@ -29,8 +29,8 @@ _NONE = np.zeros(0)
 
 @dataclass(frozen=True)
 class Fit:
-    """A structure fitted to trials. `starts_agreeing` of `starts` ended at the best cost: the certificate
-    that what is left is not the optimiser's failure."""
+    """A structure fitted to trials. `starts_agreeing` of `starts` ended at the best cost: evidence that the remaining
+    misfit is not a failure of the optimiser."""
 
     problem: Problem
     solution: Solution
@@ -51,17 +51,17 @@ class Fit:
 
     @cached_property
     def known_nuisances(self) -> dict[str, np.ndarray]:
-        """Nuisances of the trials that it was evaluated on besides its own, by the trial's name."""
+        """Cached nuisances of trials that the fit was evaluated on (`evaluate_on`), by trial name."""
         return {}
 
     @property
     def at_bound(self) -> np.ndarray:
-        """Of each free parameter whether a bound stopped it, shape (P,): whether it would reach the bound for less than
-        a search ends at, the others following. A search seldom ends on a bound to the last digit."""
+        """Whether a bound stopped each free parameter, shape (P,). A search seldom ends exactly on a bound, so the test
+        is whether the parameter could reach it, the others refitted, at a cost below the search's tolerance."""
         free = list(self.solution.free)
         values, scales = self.solution.point.values, self.structure.scales()[free]
         normal = self.solution.normal * np.outer(scales, scales)
-        known = np.eye(len(free)) / _OPEN**2  # where the data leave a parameter open, it is near within this
+        known = np.eye(len(free)) / _OPEN**2  # decides for a parameter that the data leave open
         covariance = np.linalg.inv(normal + known) * np.outer(scales, scales)
         variance = np.diag(covariance)
         from_below = variance.copy()
@@ -74,6 +74,7 @@ class Fit:
         return (below**2 <= 2.0 * ENOUGH * from_below) | (above**2 <= 2.0 * ENOUGH * variance)
 
     def predictions(self) -> list[Channels]:
+        """Predictions of every fitted trial."""
         return self.problem.predict_all(self.solution.point)
 
     def residuals(self) -> dict[str, Channels]:
@@ -84,7 +85,7 @@ class Fit:
         }
 
     def scaled_residuals(self) -> list[Channels]:
-        """Measured minus predicted in standard deviations of the floor, one mapping a trial."""
+        """Measured minus predicted in standard deviations of the floor, one mapping per trial."""
         return self.problem.scaled(self.predictions())
 
 
@@ -98,8 +99,8 @@ def fit(
     relative: float = RELATIVE,
     graduated: bool = False,
 ) -> Fit:
-    """Fit all parameters of `structure` from each of `starts` (vectors; default its own); keep the best. `graduated`:
-    see `solve_graduated`."""
+    """Fit all parameters of `structure` from each of `starts` (vectors; default: its own start) and keep the best.
+    `graduated`: see `solve_graduated`."""
     problem = Problem(structure, trials, floor)
     vectors = list(starts) or [structure.start()]
     options: dict[str, Any] = {"max_iterations": max_iterations, "relative": relative}
@@ -111,6 +112,7 @@ def fit(
 
 
 def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
+    """Return the solution of least cost as a fit, with the number of solutions that agree with it."""
     best = min(solutions, key=lambda s: s.cost)
     margin = max(1.0, _SAME_COST * best.cost)
     agreeing = sum(s.cost < best.cost + margin for s in solutions)
@@ -120,8 +122,8 @@ def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
 def refit_on(
     fitted: Fit, trials: Sequence[Record], *, near: Sequence[Fit], max_iterations: int = 20, relative: float = RELATIVE
 ) -> Fit:
-    """The same structure fitted to other trials, from where it stands. `near`: fits that know the nuisances of all of
-    these trials."""
+    """Refit the structure to other trials, starting from the fitted values. `near`: fits that together contain the
+    nuisances of all these trials."""
     problem = fitted.problem.over(trials)
     known = {name: nuisances for one in near for name, nuisances in _by_name(one).items()}
     start = Point(fitted.solution.point.values, tuple(known[t.name] for t in trials))
@@ -130,21 +132,23 @@ def refit_on(
 
 
 def converged(fitted: Fit) -> Fit:
-    """The fit at the end of plain least squares, from where it stands: what an RMS error is stated for. Searches
+    """Continue the fit by plain least squares to convergence, the state for which an RMS error is reported. Searches
     follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
     problem = fitted.problem.seen(PLAIN)
     options: dict[str, Any] = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _FRUITFUL}
     solution = solve(problem, fitted.solution.point, **options)
-    if not fitted.structure.sites:  # curves are many parameters, and their fit is not compared with another's
+    if not fitted.structure.sites:  # curves have many parameters, and their fits are not compared with others
         solution = renewed(problem, solution, fruitful=_CONVERGED, **options)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
 def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL, **options: Any) -> Solution:
-    """Searches that follow `solution`, for as long as one gains the share `fruitful` of the cost: with nuisances as
-    they are and, while that leads further, restarted at their means. A nuisance and a parameter of like effect (a
-    run's friction and the friction) hold one another where the model predicts a jump a little early or late; a search
-    has to let go of one of them."""
+    """Continue from `solution` with further searches for as long as one gains the share `fruitful` of the cost.
+
+    Each round searches on with the nuisances as they are and, while that helps, also with the nuisances restarted at
+    their means. If the model predicts a jump slightly early or late, a nuisance and a parameter of similar effect (a
+    run's friction and the friction) hold each other in place until a search releases one of them.
+    """
     letting_go = any(problem.nuisances)
     for _ in range(_ROUNDS):
         further = [] if solution.converged else [solve(problem, solution.point, **options)]
@@ -161,8 +165,8 @@ def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL
 
 
 def at_its_misfit(fitted: Fit) -> Fit:
-    """The fit with the floor of a channel raised to what it leaves there, where that is beyond what counts by its
-    square: all samples are that bad then, and none of them is to be spared."""
+    """Refit with the floor of a channel raised to the RMS residual that the fit leaves there, if that exceeds
+    `SOFT_LIMIT`: all samples of the channel are then badly predicted, and none should be discounted as an outlier."""
     squares: dict[tuple[str, str], list[np.ndarray]] = {}
     for trial, channels in zip(fitted.problem.trials, fitted.scaled_residuals(), strict=True):
         for channel, z in channels.items():
@@ -173,15 +177,15 @@ def at_its_misfit(fitted: Fit) -> Fit:
 
 
 def released(fitted: Fit) -> Fit:
-    """The fit as it stands, what was known from its trials beforehand standing back."""
+    """Return the fit, its parameters unchanged, with relaxed priors on those with `Parameter.prior_from_trials`."""
     problem = fitted.problem.with_prior(released=True)
     cost = cost_of(problem, fitted.solution.point)
     return Fit(problem, replace(fitted.solution, cost=cost), fitted.starts, fitted.starts_agreeing)
 
 
 def predictive(fitted: Fit) -> Fit:
-    """The fit with each run's factors of parameters (`Parameter.factor_of`) at their means: what could be said of a
-    run before it is made."""
+    """Return the fit with each run's factors of parameters (`Parameter.factor_of`) at their means, as for a prediction
+    made before the run."""
     problem, point = fitted.problem, fitted.solution.point
     if not any(p.factor_of for parameters in problem.nuisances for p in parameters):
         return fitted
@@ -195,15 +199,15 @@ def predictive(fitted: Fit) -> Fit:
 
 
 def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
-    """The same structure and trials against another floor, by a few steps with the derivatives that there are; without
-    any steps it has no derivatives either."""
+    """Refit the same structure and trials against another floor, by a few steps with the existing derivatives. With
+    `max_iterations` 0 only the cost is recomputed, and the result has no derivatives."""
     point = fitted.solution.point
     problem = fitted.problem.over(fitted.problem.trials, floor)
     sensitivities = fitted.solution.sensitivities
     if not max_iterations:
         bare = replace(fitted.solution, cost=cost_of(problem, point), normal=np.zeros((0, 0)), sensitivities=())
         return Fit(problem, bare, fitted.starts, fitted.starts_agreeing)
-    known = None  # they are recomputed
+    known = None  # derivatives are recomputed
     if sensitivities:
         pairs = zip(problem.slopes(point), fitted.problem.slopes(point), strict=True)
         known = [s.reweighed(new / old) for s, (new, old) in zip(sensitivities, pairs, strict=True)]
@@ -212,21 +216,21 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
 
 
 def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = None) -> Fit:
-    """The fitted parameters on other trials: only the trials' own nuisances are estimated, each trial's once, from
-    where `near` has them if it knows them all. The cost is of these trials alone: what the parameters themselves
-    cost, their own fit has counted."""
+    """Evaluate the fitted parameters on other trials, estimating only these trials' nuisances, starting from those in
+    `near` where it has them. Each trial is estimated once per fit. The cost covers these trials alone: the prior cost
+    of the parameters is already counted in their own fit."""
     known, values = fitted.known_nuisances, fitted.solution.point.values
     asked = fitted.problem.over([t for t in trials if t.name not in known])
     if any(asked.nuisances):
         begun = _by_name(near) if near else {}
         point = asked.start(values, [begun.get(t.name, _NONE) for t in asked.trials])
-        # a run's nuisance may be many times the noise away, where only plain least squares leads there
+        # a run's nuisance may be far from its mean; only plain least squares converges from there
         far = any(t.name not in begun for t in asked.trials)
         for view in dict.fromkeys((PLAIN, asked.view) if far else (asked.view,)):
             found = solve(asked.seen(view), point, free=(), max_iterations=_NUISANCE_ITERATIONS)
             point = found.point
         known |= _by_name(Fit(asked, found, 1, 1))
-    # where all were asked, their residuals are still remembered
+    # if all trials were just estimated, their residuals are still cached
     problem = asked if len(asked.trials) == len(trials) else fitted.problem.over(trials)
     point = Point(values, tuple(known.get(t.name, _NONE) for t in problem.trials))
     cost = cost_of(problem, point) - problem.structure_prior_cost(point)
@@ -235,15 +239,15 @@ def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = Non
 
 
 def _by_name(fitted: Fit) -> dict[str, np.ndarray]:
-    """Each trial's nuisances."""
+    """Nuisances of each trial by its name."""
     return dict(zip((t.name for t in fitted.problem.trials), fitted.solution.point.nuisances, strict=True))
 
 
 def spread_starts(structure: Structure, around: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
-    """`around` and count - 1 vectors drawn over all that is plausible, within the bounds; deterministic.
+    """Return `around` and count - 1 random vectors within the bounds; deterministic for a given `seed`.
 
-    A parameter lies anywhere in its plausible range, or as its prior has it, or else within a few scales of `around`;
-    an effect has any size that fits begin at, of either sign where the bounds allow it.
+    A parameter is drawn uniformly from its plausible range, else from its prior, else within a few scales of `around`.
+    The size of an effect is drawn from the range of its start sizes, with either sign if the bounds allow it.
     """
     draw = np.random.default_rng(seed)
     return [around, *(_drawn(structure, around, draw) for _ in range(count - 1))]
@@ -267,8 +271,8 @@ def _drawn(structure: Structure, around: np.ndarray, draw: np.random.Generator) 
 
 
 def fit_base(system: System, trials: Sequence[Record]) -> Fit:
-    """Fit the base model, then take the noise floor from what repeats differ by in the residual and refit, for as long
-    as the floor falls: the first one has in it whatever else differs between runs."""
+    """Fit the base model, then re-estimate the noise floor from the differences between repeats' residuals and refit,
+    for as long as the floor falls: the first floor includes whatever else differs between runs."""
     floor = estimate_noise(system, trials)
     found = fit(Structure(system), trials, floor, max_iterations=30, graduated=True)
     for _ in range(SHARPENED):
@@ -283,6 +287,6 @@ def fit_base(system: System, trials: Sequence[Record]) -> Fit:
 
 
 def starting_point(fitted: Fit, structure: Structure) -> np.ndarray:
-    """The vector of `structure` that continues from `fitted`: what both have in common keeps its value."""
+    """Return a vector of `structure` for a warm start: parameters in common with `fitted` keep their values."""
     common = {name: value for name, value in fitted.theta.items() if name in structure.names}
     return structure.values(structure.theta(structure.start()) | common)

@@ -1,10 +1,11 @@
-"""Graduated fits, for starts that are far off: residuals are first smoothed and weighed loosely, then ever closer.
+"""Graduated fits, for starts far from the optimum: residuals are first smoothed and weighted loosely, then ever less.
 
-A record that jumps (a snap-through, a foot that slips) and a prediction that jumps at another time differ by the whole
-jump until the two meet, and nothing says which way to go. Low-passed, the two overlap, and with a raised floor what is
-far off still counts: the same search then finds its way (graduated optimisation; Blake and Zisserman, Visual
-Reconstruction, 1987). Trials that isolate parameters go first, since where everything acts together errors add up over
-time. What they cannot tell apart (`Parameter.elsewhere`), all trials together decide.
+If a record jumps (a snap-through, a foot that slips) and its prediction jumps at another time, they differ by the whole
+jump until the two times coincide, and the cost has no gradient towards that. Low-passed, the two overlap, and with a
+raised floor large residuals still count, so that the same search converges (graduated optimisation; Blake and
+Zisserman, Visual Reconstruction, 1987). Trials that isolate parameters go first, since in the others, where everything
+acts together, errors accumulate over time. If isolating trials fit equally well at several values
+(`Parameter.elsewhere`), all trials together decide.
 """
 
 from __future__ import annotations
@@ -19,33 +20,33 @@ from lacuna.estimation.solve import RELATIVE, Solution, solve
 _FAR, _NEARER, _CLOSE = View(1 / 20, 30.0, 30.0), View(1 / 60, 10.0, 30.0), View(1 / 200, 3.0, 30.0)
 _ISOLATED = (_FAR, _NEARER, _CLOSE)
 _PLACES = View(raised=10.0)
-_NEAR, _MOST = 1e-3, 40  # of the cost: where a search from a distance may stop; iterations at most
-_SAME = 0.2  # scales: places that end within this of one another are one
-_BETTER = 0.9  # of the cost that the start leads to, what one from elsewhere must come down to, to be preferred
-_ENOUGH, _HOPEFUL = 0.02, 3.0  # log-likelihood, and times the least cost: what leaves more is not followed any closer
+_NEAR, _MOST = 1e-3, 40  # tolerance of a smoothed search, relative to the cost, and its largest number of iterations
+_SAME = 0.2  # scales: starts that end within this of one another are one
+_BETTER = 0.9  # of the cost reached from the original start; another start must come below it to be preferred
+_ENOUGH, _HOPEFUL = 0.02, 3.0  # log-likelihood and multiple of the least cost; starts that exceed both are dropped
 
 
 def solve_graduated(
     problem: Problem, values: np.ndarray, *, max_iterations: int, relative: float = RELATIVE
 ) -> Solution:
-    """Minimise the cost from `values`, wherever they are. Parameters of which something was known beforehand begin
-    there, and stay until the others are near."""
+    """Minimise the cost from `values`, which may be far from the optimum. Parameters with a declared prior start at its
+    mean and stay there until the others are close."""
     structure, every = problem.structure, range(len(values))
     isolated = problem.over([t for t in problem.trials if structure.system.isolates(t)])
     free = [i for i, p in enumerate(structure.parameters) if p.prior_sd is None]
     values = np.where(np.isin(every, free), values, structure.prior_mean())
-    if isolated.trials:  # a small part of the whole work
+    if isolated.trials:  # a small part of the total work
         values = _followed(isolated, values, _ISOLATED, free).point.values
         values = _followed(isolated, values, (SHARP,), every).point.values
     hidden = [j for j in every if not any(structure.moves(j, t) for t in isolated.trials)]
     starts = [values, *_elsewhere(isolated, values, free)]
-    # what isolated trials have fitted waits at first: a walk seen from a distance says little of it
+    # parameters fitted to isolating trials stay fixed at first: smoothed residuals say little about them
     for view, moving in ((_FAR, hidden), (_NEARER, every)):
         found = [_followed(problem, start, (view,), moving, max_iterations) for start in starts]
         least = min(one.cost for one in found)
         found = [one for one in found if one.cost <= max(_ENOUGH, _HOPEFUL * least)]
         starts = [one.point.values for one in found]
-    # alike: where it began stays
+    # of similar costs, the earlier start is preferred
     best = found[0] if least > _BETTER * found[0].cost else min(found, key=lambda one: one.cost)
     return solve(problem, problem.start(best.point.values), max_iterations=max_iterations, relative=relative)
 
@@ -53,7 +54,7 @@ def solve_graduated(
 def _followed(
     problem: Problem, values: np.ndarray, views: Sequence[View], free: Sequence[int], max_iterations: int = _MOST
 ) -> Solution:
-    """Where the search ends in the last of `views`, each begun where the one before ended."""
+    """Minimise the cost under each of `views` in turn, starting from the previous result, and return the last."""
     for view in views:
         distant = problem.seen(view)
         found = solve(distant, distant.start(values), free=free, max_iterations=max_iterations, relative=_NEAR)
@@ -62,8 +63,8 @@ def _followed(
 
 
 def _elsewhere(isolated: Problem, values: np.ndarray, free: Sequence[int]) -> list[np.ndarray]:
-    """Where else the isolated trials lead, from each of the places that parameters offer: those of `free` that only
-    the same trials show are fitted to these, the others stay."""
+    """Further starts: the distinct optima of the isolating trials from each value in `Parameter.elsewhere`. For each
+    such parameter, those in `free` that only the same trials depend on are fitted to these trials; the others stay."""
     structure = isolated.structure
     found: list[np.ndarray] = []
     shown = {j: frozenset(t.name for t in isolated.trials if structure.moves(j, t)) for j in free}

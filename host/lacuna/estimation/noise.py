@@ -1,10 +1,9 @@
-"""The noise floor of a system's trials, taken from the repeats.
+"""The noise floor of a system's trials, estimated from repeats.
 
-Run-to-run spread is often several times the sensor's noise, so a residual is structure only where it
-exceeds what repeats of the same condition differ by. Two numbers a channel describe that spread: a standard
-deviation, and a timing jitter for records that jump (a snap-through 10 ms later is a huge residual, and
-means nothing). A third, the correlation time, says how many samples carry one independent piece of
-information.
+The spread from run to run is often several times the sensor's noise, so a residual is structure only where it exceeds
+the differences between repeats of a condition. Two numbers per channel describe that spread: a standard deviation, and
+a timing jitter for records that jump (a snap-through 10 ms later is a huge residual but means nothing). A third number,
+the correlation length, says how many samples carry one independent piece of information.
 """
 
 from __future__ import annotations
@@ -23,26 +22,26 @@ from lacuna.check.numbers import fast_noise
 from lacuna.estimation.sampling import correlation_samples, evenly, sample_period
 from lacuna.system import Channels, Record, System, by_channel, groups_of_repeats
 
+LOWER = 0.9  # a new floor below this share of the old one changes the weights enough for another refit
+SHARPENED = 5  # re-estimates of a floor, at most
 # Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
-LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
-SHARPENED = 5  # times at most that one is taken again
 _SHIFT_NODES, _SHIFT_WEIGHTS = hermegauss(8)
 _SHIFT_WEIGHTS /= _SHIFT_WEIGHTS.sum()
 _LONGEST_JITTER_S = 0.5
 _MOVING_SIGMAS = 6.0
 _WINDOW_S = 0.05
-_SAME_VALUE = 1e-9  # of a record's range: values that differ by less are one
-_RECUR = 0.9  # of a record's samples are values of their own at most, where values recur
-_ON_THE_GRID = 1e-3  # of a step
+_SAME_VALUE = 1e-9  # of a record's range: values closer than this are equal
+_RECUR = 0.9  # distinct values per sample, at most, in a record whose values recur
+_ON_THE_GRID = 1e-3  # of a rounding step: deviation from a multiple, at most
 
 
 @dataclass(frozen=True)
 class ChannelNoise:
     """Spread of one channel in one experiment.
 
-    `sd` in the channel's unit, `jitter_s` of events in time, `samples_per_piece`: how many neighbouring
-    samples count as one independent observation. `repeats` is the number of pairs of repeats it came from;
-    0: there are none.
+    `sd` is the standard deviation in the channel's unit, `jitter_s` that of the timing of events, `samples_per_piece`
+    the number of neighbouring samples that count as one independent observation. `repeats` is the number of pairs of
+    repeats that it was estimated from; 0: there are none.
     """
 
     sd: float
@@ -52,25 +51,25 @@ class ChannelNoise:
 
     @property
     def per_piece(self) -> float:
-        """Standard deviation that a mean over n samples has, times sqrt(n)."""
+        """Standard deviation of a mean over n samples, times sqrt(n)."""
         return self.sd * self.samples_per_piece**0.5
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """`channels` by (experiment, channel)."""
+    """Noise of every channel in every experiment: `channels` by (experiment, channel)."""
 
     channels: Mapping[tuple[str, str], ChannelNoise]
 
     def of(self, experiment: str, channel: str) -> ChannelNoise:
-        """In an experiment that informs nothing, the most that the channel has in others."""
+        """Noise of a channel in an experiment; if unknown there, the largest that it has in any other experiment."""
         if (experiment, channel) in self.channels:
             return self.channels[experiment, channel]
         others = (noise for (_, known), noise in self.channels.items() if known == channel)
         return max(others, key=lambda noise: noise.per_piece)
 
     def sd(self, trial: Record, channel: str) -> np.ndarray:
-        """Standard deviation of each sample of a trial, shape (n,): grows where the record moves fast."""
+        """Standard deviation of each sample of a trial, shape (n,); larger where the record moves fast."""
         noise = self.of(trial.experiment, channel)
         if noise.jitter_s == 0:
             return np.full(trial.time_s.shape, noise.sd)
@@ -78,32 +77,33 @@ class NoiseFloor:
         return np.sqrt(noise.sd**2 + _shift_variance(trial.time_s, samples, noise.jitter_s, noise.sd))
 
     def lowered_by(self, other: NoiseFloor) -> NoiseFloor:
-        """The lower of two floors for each channel: both are upper bounds, since a model that does not fit
-        adds its own differences to those between runs. A channel of which the other knows nothing stays."""
+        """Return the lower of two floors for each channel. Both are upper bounds, since a model that does not fit adds
+        its own differences to those between runs. Channels that `other` lacks are kept."""
         known = other.channels
         return NoiseFloor({k: min(n, known.get(k, n), key=lambda c: c.per_piece) for k, n in self.channels.items()})
 
     def raised(self, factors: Mapping[tuple[str, str], float]) -> NoiseFloor:
-        """The floor of some channels so many times as high."""
+        """Return the floor with the standard deviation of some channels multiplied by `factors`."""
         known = self.channels.items()
         return NoiseFloor({k: replace(n, sd=factors[k] * n.sd) if k in factors else n for k, n in known})
 
     def share_of(self, other: NoiseFloor) -> float:
-        """The smallest ratio of this floor to `other` among the channels."""
+        """Smallest ratio of this floor to `other` over all channels."""
         return min(n.per_piece / other.channels[k].per_piece for k, n in self.channels.items())
 
     def samples_per_piece(self, trial: Record, channel: str) -> float:
+        """Number of a trial's neighbouring samples that count as one independent observation."""
         return self.of(trial.experiment, channel).samples_per_piece
 
 
 def estimate_noise(
     system: System, trials: Sequence[Record], residuals: Mapping[str, Channels] | None = None
 ) -> NoiseFloor:
-    """Noise floor of `trials` from the differences between repeats.
+    """Estimate the noise floor of `trials` from the differences between repeats.
 
-    `residuals` by trial name and channel (measured minus predicted): what a fit that knows each trial's
-    nuisances leaves is a sharper basis than the measurements themselves, and what the model gets wrong
-    alike in all repeats cancels.
+    If given, `residuals` (measured minus predicted, by trial name and channel) are used instead of the measurements.
+    They give a sharper estimate, because the fit accounts for each trial's nuisances, and model errors that repeats
+    have in common cancel. A channel without repeats gets its floor from fast noise, or from `System.noise_time_s`.
     """
     measured = {trial.name: trial.channels for trial in trials}
     basis = measured if residuals is None else residuals
@@ -157,8 +157,8 @@ def _from_pairs(
 def _of_fast_noise(
     members: Sequence[Record], channel: str, sensor: float, basis: Mapping[str, Channels]
 ) -> ChannelNoise:
-    """Without repeats, told nothing: from the fast noise of residuals (without them of the records, as an upper bound,
-    since a record may itself be fast)."""
+    """Floor without repeats or a declared correlation time, from the fast noise of `basis`: residuals, or the records
+    themselves, which give an upper bound, since a record may itself vary fast."""
     sd = float(np.median([fast_noise(trial.time_s, basis[trial.name][channel]) for trial in members]))
     return ChannelNoise(max(sd, sensor, _smallest(members, channel)), 0.0, 1.0, 0)
 
@@ -166,8 +166,8 @@ def _of_fast_noise(
 def _of_correlated(
     members: Sequence[Record], channel: str, correlated_s: float, sensor: float, basis: Mapping[str, Channels]
 ) -> ChannelNoise:
-    """Without repeats, told how long the noise remembers itself: from what residuals (without them the records, as an
-    upper bound) change by within that time, since what changes more slowly is no noise."""
+    """Floor without repeats but with a declared correlation time, from the changes of `basis` within that time, since
+    slower changes are not noise. `basis` is residuals, or the records, which give an upper bound."""
     changes, pieces = [], []
     for trial in members:
         period, samples = sample_period(trial.time_s), evenly(trial.time_s, basis[trial.name][channel])
@@ -180,7 +180,7 @@ def _of_correlated(
 
 
 def _difference(first: Record, second: Record, channel: str, basis: Mapping[str, Channels]) -> np.ndarray:
-    """(first - second) / sqrt(2) on the first's time base: of the same variance as the noise of either."""
+    """(first - second) / sqrt(2) on the time base of `first`, which has the variance of a single record's noise."""
     a, b = basis[first.name][channel], basis[second.name][channel]
     known = np.isfinite(b)
     if known.sum() < 2:
@@ -189,12 +189,12 @@ def _difference(first: Record, second: Record, channel: str, basis: Mapping[str,
 
 
 def at_times(time_s: np.ndarray, measured_s: np.ndarray, samples: np.ndarray) -> np.ndarray:
-    """A repeat's samples at another's times; NaN before it begins and after it ends."""
+    """Interpolate a repeat's samples to another's times; NaN before it begins and after it ends."""
     return np.interp(time_s, measured_s, samples, left=np.nan, right=np.nan)
 
 
 def _moves(trial: Record, channel: str) -> np.ndarray:
-    """Where a record changes within the window by much more than its fast noise."""
+    """Mask of the samples at which a record changes by much more than its fast noise within `_WINDOW_S`."""
     samples, time_s, period = trial.channels[channel], trial.time_s, sample_period(trial.time_s)
     window_s = max(1, round(_WINDOW_S / period)) * period
     smooth = _smooth(samples)
@@ -208,7 +208,7 @@ def _jitter(
     moving: Sequence[np.ndarray],
     sd: float,
 ) -> float:
-    """The shift in time whose mean square effect explains what fast-moving samples differ by beyond `sd`."""
+    """Timing jitter whose mean square effect explains the differences of fast-moving samples beyond `sd`."""
     excess = float(np.nansum([np.nansum(d[m] ** 2 - sd**2) for d, m in zip(differences, moving, strict=True)]))
     if excess <= 0 or not any(m.any() for m in moving):
         return 0.0
@@ -228,8 +228,8 @@ def _jitter(
 def _shift_variance(
     time_s: np.ndarray, samples: np.ndarray, jitter_s: float, sd: float, where: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
-    """Mean square change of a smooth record under a random shift in time, less what its own noise adds; of the samples
-    `where`."""
+    """Mean square change of the samples `where` of a smooth record under a random shift in time, less the contribution
+    of the record's own noise."""
     known = np.isfinite(samples)
     if known.sum() < 2:
         return np.zeros(samples[where].shape)
@@ -245,21 +245,20 @@ def _smooth(samples: np.ndarray) -> np.ndarray:
 
 
 def _smallest(trials: Sequence[Record], channel: str) -> float:
-    """What a floor is at least: what rounding leaves, and, so that records without noise do not get infinite weights,
-    1e-4 of the channel's spread."""
+    """Lower bound of a floor: the rounding error, and 1e-4 of the channel's spread, so that noise-free records do not
+    get infinite weights."""
     spread = max(float(np.nanstd(trial.channels[channel])) for trial in trials)
     rounded = max(_rounding_step(trial.channels[channel]) for trial in trials)
     return max(1e-4 * spread, rounded / np.sqrt(12.0)) or 1e-12
 
 
 def _rounding_step(samples: np.ndarray) -> float:
-    """The step that the values of a record were rounded to; 0 if they were not. In a rounded record values recur that
-    are all multiples of one step apart, to the decimals that they were written with, or else most samples are the same
-    as their neighbours."""
+    """Return the step to which a record was rounded, or 0. A record counts as rounded if its values recur and their
+    differences are multiples of one step (to the decimals written), or if most samples equal their neighbours."""
     known = samples[np.isfinite(samples)]
     values = np.unique(known)
     steps = np.diff(values)
-    steps = steps[steps > _SAME_VALUE * np.ptp(known)] if len(steps) else steps  # what arithmetic makes of equal ones
+    steps = steps[steps > _SAME_VALUE * np.ptp(known)] if len(steps) else steps  # without rounding errors
     if len(steps) < 2:
         return 0.0
     step, written = _common_step(steps), _last_decimal(values)
@@ -272,13 +271,13 @@ def _rounding_step(samples: np.ndarray) -> float:
 
 
 def _common_step(steps: np.ndarray) -> float:
-    """What `steps` are multiples of, if of anything: the mean of those that may be single ones, then of all."""
+    """Estimate the step of which all `steps` are multiples: first from the shortest ones, then refined with all."""
     single = float(np.mean(steps[steps < 1.5 * steps.min()]))
     return float(steps.sum() / np.maximum(np.round(steps / single), 1.0).sum())
 
 
 def _last_decimal(values: np.ndarray) -> float:
-    """The power of ten that values were written to the nearest of; 0 if they have more digits than anybody writes."""
+    """Return the power of ten to which values were rounded when written; 0 if they have too many digits for that."""
     largest = float(np.abs(values).max()) or 1.0
     for power in range(int(np.ceil(np.log10(largest))), int(np.floor(np.log10(_SAME_VALUE * largest))), -1):
         if np.allclose(values, np.round(values, -power), rtol=0.0, atol=_SAME_VALUE * largest):

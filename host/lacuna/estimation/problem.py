@@ -1,4 +1,4 @@
-"""Residuals of many trials and their derivatives, computed on all cores."""
+"""Weighted residuals of many trials and their derivatives, computed on all cores."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from lacuna.estimation.sensitivity import Sensitivity
 from lacuna.estimation.structure import Structure
 from lacuna.system import Channels, Parameter, Record
 
-LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of a parameter's scale, for derivatives
+LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of finite differences, in scales of the parameter
 SOFT_LIMIT = 10.0  # standard deviations beyond which a residual counts less than its square
-_OWN_STARTS = 8  # values tried of a parameter that a trial has its own of
-_REMEMBERED = 4  # points whose residuals are kept
-_WORTH_A_PACK = 3  # trials: fewer gain little from each other, and more from a core each
+_OWN_STARTS = 8  # initial values tried for a parameter with a separate value in every trial
+_REMEMBERED = 4  # points whose residuals are cached
+_WORTH_A_PACK = 3  # trials; fewer gain less from being simulated side by side than from a core each
 FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
-_MOST = 1e8  # standard deviations: what is further off ran away, and counts as no more, or its square would overflow
+_MOST = 1e8  # standard deviations; predictions that diverge further are clipped here, since squares would overflow
 
 
 _threads: int | None = None
 
 
 def usable_cores() -> int:
-    """How many this process may run on; where the system does not tell (macOS, Windows), all."""
+    """Number of cores this process may run on; all of them if the system cannot tell (macOS, Windows)."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def cores() -> int:
-    """On how many this process simulates."""
+    """Number of cores on which this process simulates."""
     return _threads or usable_cores()
 
 
@@ -46,19 +46,19 @@ def _pool() -> ThreadPoolExecutor:
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pool.cache_clear)  # a child has the pool but none of its threads: it would wait
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # a forked child inherits the pool without its threads
 
 
 def use_threads(count: int | None) -> None:
-    """From now on this process simulates on so many threads; None: on all cores."""
+    """Set the number of threads on which this process simulates; None: one per core."""
     global _threads
     _threads = count
     _pool.cache_clear()
 
 
 def in_parallel(function: Callable[..., Any], items: Iterable[Any], work: Sequence[float] = ()) -> list[Any]:
-    """`[function(x) for x in items]` on all cores, by threads: simulations release the GIL. What is most `work` begins
-    first, so that no core waits for another's last."""
+    """Return `[function(x) for x in items]`, computed by threads on all cores (simulations release the GIL). Items with
+    the most `work` start first, so that cores do not idle at the end."""
     if cores() == 1:
         return list(map(function, items))
     items = list(items)
@@ -69,7 +69,7 @@ def in_parallel(function: Callable[..., Any], items: Iterable[Any], work: Sequen
 
 @dataclass(frozen=True)
 class Point:
-    """Where a problem stands: the structure's vector, shape (P,), and each trial's nuisances, shape (q,) each."""
+    """A point in parameter space: the structure's vector, shape (P,), and each trial's nuisances, shape (q,) each."""
 
     values: np.ndarray
     nuisances: tuple[np.ndarray, ...]
@@ -77,11 +77,11 @@ class Point:
 
 @dataclass(frozen=True)
 class View:
-    """How closely residuals are looked at.
+    """How residuals are smoothed and weighted during a fit.
 
-    `blur`: time constant of a low-pass that they go through first, as a share of the trial's duration (0: none).
-    `raised`: factor of the floor's standard deviation. Residuals beyond `soft_limit` standard deviations are
-    compressed (asinh).
+    `blur`: time constant of a low-pass filter applied to them first, as a share of the trial's duration (0: none).
+    `raised`: factor by which the floor's standard deviation is raised. Residuals beyond `soft_limit` standard
+    deviations are compressed (asinh).
     """
 
     blur: float = 0.0
@@ -90,16 +90,16 @@ class View:
 
 
 SHARP = View()
-PLAIN = View(soft_limit=1e6)  # plain least squares: what an RMS error measures
+PLAIN = View(soft_limit=1e6)  # plain least squares, the criterion of an RMS error
 
 
 class Problem:
     """The residuals of `trials` under a structure, weighted by a noise floor.
 
-    A residual is (predicted - measured) / sd / sqrt(samples per independent piece), so that half its sum of
-    squares is a log-likelihood in independent pieces of information, not in samples. Beyond `view.soft_limit`
-    standard deviations it is compressed (asinh), so that a jump at a slightly wrong time does not outweigh
-    everything else.
+    A residual is (predicted - measured) / sd / sqrt(samples per independent piece), so that half the sum of squares is
+    minus a log-likelihood that counts independent pieces of information, not samples. Beyond `view.soft_limit` standard
+    deviations it is compressed (asinh), so that a jump predicted at a slightly wrong time does not outweigh everything
+    else.
     """
 
     def __init__(self, structure: Structure, trials: Sequence[Record], floor: NoiseFloor, view: View = SHARP):
@@ -112,18 +112,19 @@ class Problem:
         self._grids = [[even_grid(t.time_s[np.isfinite(v)]) for v in t.channels.values()] for t in trials]
         self._prior = structure.prior_precision()
         self._own = [structure.own(t) for t in trials]
-        # residuals by point: a search begins where the one before ended
+        # cached residuals by point, since a search often begins where the previous one ended
         self._recent: dict[tuple[Any, ...], list[np.ndarray]] = {}
         self.sizes = [len(w.keep) for w in self._weighing]  # samples of all channels of each trial
         self._together = _side_by_side(self.trials, structure.system.at_once)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What travels to another process: all but what is remembered."""
+        """State for pickling, without the cached residuals."""
         return vars(self) | {"_recent": {}}
 
     def start(self, values: np.ndarray | None = None, known: Sequence[np.ndarray] | None = None) -> Point:
-        """The structure's vector `values` (default its start), nuisances at their means or, the first ones of each
-        trial, as `known`. An effect's own parameters of a trial begin at the best of a few values."""
+        """Return a point to start from: the structure's vector `values` (default: its start) with nuisances at their
+        means, or the leading ones of each trial as `known`. Parameters with a separate value in every trial start at
+        the best of a few values."""
         start = self.structure.start() if values is None else np.asarray(values, float)
         nuisances = [np.array([p.value for p in ps]) for ps in self.nuisances]
         for mine, given in zip(nuisances, known or (), strict=False):
@@ -132,7 +133,7 @@ class Problem:
         return Point(start, tuple(nuisances))
 
     def _scan(self, values: np.ndarray, nuisances: list[np.ndarray], index: int) -> None:
-        """Set the effects' own parameters of a trial, the last first, to the best of `_OWN_STARTS` values each."""
+        """Set each of the effects' own parameters of a trial, the last first, to the best of `_OWN_STARTS` values."""
         for k in range(-1, -len(self._own[index]) - 1, -1):
             parameter = self.nuisances[index][k]
             tried = np.tile(nuisances[index], (_OWN_STARTS, 1))
@@ -142,35 +143,36 @@ class Problem:
             nuisances[index] = tried[int(np.argmin(costs))]
 
     def seen(self, view: View) -> Problem:
-        """The same problem looked at in another way."""
+        """Return the same problem with another view of its residuals."""
         other = copy(self)
         other.view = view
         return other
 
     def with_prior(self, *, released: bool = False, sizes: Mapping[str, float] | None = None) -> Problem:
-        """The same problem with another prior (`Structure.prior_precision`)."""
+        """Return the same problem with another prior (`Structure.prior_precision`)."""
         other = copy(self)
         other._prior = self.structure.prior_precision(released, sizes)
         return other
 
     def over(self, trials: Sequence[Record], floor: NoiseFloor | None = None) -> Problem:
-        """The same problem with other trials, or against another floor."""
+        """Return the same problem with other trials and, if given, another floor."""
         other = Problem(self.structure, trials, floor or self.floor, self.view)
         other._prior = self._prior
         return other
 
     def predict_all(self, point: Point) -> list[Channels]:
+        """Predictions of every trial; NaN where they diverge."""
         return self._of_each(point, self._within_reach)
 
     def _within_reach(self, prediction: Channels, index: int) -> Channels:
-        """NaN in the place of what ran away: it is no prediction, and its square may be no number."""
+        """Replace diverging samples by NaN: they are no predictions, and their squares may overflow."""
         trial = self.trials[index]
         with np.errstate(invalid="ignore"):
             far = {c: np.abs(prediction[c]) > _MOST * self._spans[index][c] for c in trial.channels}
         return {c: np.where(far[c], np.nan, prediction[c]) if far[c].any() else prediction[c] for c in trial.channels}
 
     def residuals(self, point: Point) -> list[np.ndarray]:
-        """One vector a trial, channels one after the other, weighted."""
+        """Weighted residuals, one vector per trial, with the channels one after the other."""
         key = (self.view, point.values.tobytes(), *(q.tobytes() for q in point.nuisances))
         if key not in self._recent:
             coarse = self.view.raised > 1.0
@@ -181,27 +183,27 @@ class Problem:
         return self._recent[key]
 
     def prior_cost(self, point: Point) -> float:
-        """Minus log of the priors on the structure's vector (the learnt curves') and on the nuisances."""
+        """Minus the log of the priors on the structure's vector and on the nuisances."""
         cost = self.structure_prior_cost(point)
         for values, parameters in zip(point.nuisances, self.nuisances, strict=True):
             cost += 0.5 * sum(((v - p.value) / p.step_scale) ** 2 for v, p in zip(values, parameters, strict=True))
         return float(cost)
 
     def structure_prior_cost(self, point: Point) -> float:
-        """The part of it that is one for all trials."""
+        """Minus the log of the prior on the structure's vector, which all trials share."""
         return 0.5 * self.prior_shift(point) @ self.prior_precision @ self.prior_shift(point)
 
     def prior_shift(self, point: Point) -> np.ndarray:
-        """How far the structure's vector is from the mean of its prior."""
+        """Difference between the structure's vector and the mean of its prior."""
         return point.values - self.structure.prior_mean()
 
     @property
     def prior_precision(self) -> np.ndarray:
-        """Of the structure's vector, shape (P, P); a raised floor makes it weaker in proportion."""
+        """Precision of the prior on the structure's vector, shape (P, P), reduced in proportion to a raised floor."""
         return self._prior / self.view.raised**2
 
     def first_steps(self) -> Point:
-        """How far derivatives step, in the parameters' units, at first: a tenth of the largest step."""
+        """Initial steps of the derivatives, in the parameters' units: a tenth of the largest step."""
         share = 0.1 * LARGEST_STEP
         return Point(
             np.maximum(share * self.structure.scales(), self.structure.grains()),
@@ -209,9 +211,9 @@ class Problem:
         )
 
     def tuned_steps(self, steps: Point, free: Sequence[int], squares: Sequence[np.ndarray]) -> Point:
-        """Steps that change the residuals by a few standard deviations in all: wide enough to drown the
-        integrator's own error, narrow enough for the derivative to be one. `squares`: of each trial the square
-        norms of its derivatives, by the free parameters and by its nuisances."""
+        """Return steps that change the residuals by a few standard deviations in total: large enough to dominate the
+        integrator's error, small enough for a finite difference to approximate the derivative. `squares`: for each
+        trial, the squared norms of its derivatives with respect to the free parameters and its nuisances."""
         scales, p = self.structure.scales(), len(free)
         structure = steps.values.copy()
         structure[list(free)] = _tuned(sum((s[:p] for s in squares), start=np.zeros(p)), scales[list(free)])
@@ -223,8 +225,8 @@ class Problem:
         return Point(structure, nuisances)
 
     def jacobians(self, point: Point, free: Sequence[int], steps: Point) -> list[Sensitivity]:
-        """For each trial the derivatives of its residuals by the parameters `free` and by its nuisances, by absolute
-        steps."""
+        """Derivatives of each trial's residuals with respect to the parameters `free` and the trial's nuisances, by
+        finite differences with absolute `steps`."""
 
         def of_trial(i: int) -> Sensitivity:
             values, nuisances, p = point.values, point.nuisances[i], len(free)
@@ -249,7 +251,7 @@ class Problem:
         return in_parallel(of_trial, range(len(self.trials)), self.sizes)
 
     def _factors(self, index: int, moving: Sequence[int]) -> dict[int, list[int]]:
-        """The nuisances of a trial that are factors of parameters all of which are in `moving`, and of which ones."""
+        """Map the nuisances of a trial that multiply only parameters in `moving` to the indices of these parameters."""
         named = {self.structure.names[j]: j for j in moving}
         return {
             k: [named[name] for name in parameter.factor_of]
@@ -260,20 +262,20 @@ class Problem:
     def changes(
         self, index: int, here: tuple[np.ndarray, np.ndarray], moved: Sequence[tuple[Any, ...]], *, coarse: bool = False
     ) -> np.ndarray:
-        """By what the residuals of a trial change, shape (len(moved), n), from `here` to each of `moved` nearby: values
-        and the trial's nuisances."""
+        """Changes of a trial's residuals, shape (len(moved), n), from `here` to each nearby point in `moved`; a point
+        is the structure's values and the trial's nuisances."""
         predictions = self._simulate([here, *moved], index, coarse=coarse, alike=True)
         first, weight = self._looked_at(self._deviations(predictions[:1], index), index)
-        with np.errstate(over="ignore", invalid="ignore"):  # seen below
+        with np.errstate(over="ignore", invalid="ignore"):  # handled below
             changes = self._samples(predictions[1:], index)
             changes -= self._samples(predictions[:1], index)
             changes *= self._weighing[index].weight
         reach = np.maximum(changes.max(axis=1, initial=0.0), -changes.min(axis=1, initial=0.0))
-        away = np.flatnonzero(~(reach <= _MOST))  # failed, or nearly so
-        changes[away] = 0.0  # replaced below: infinite ones would be summed
+        away = np.flatnonzero(~(reach <= _MOST))  # failed or diverging
+        changes[away] = 0.0  # replaced below; infinities would enter the sums
         if self.view.blur:
             changes, _ = self._looked_at(changes, index)
-        # over as small a step as a derivative takes, the compression is a straight line
+        # the compression is linear over a step as small as a derivative's
         changes *= weight / self.view.raised / np.hypot(1.0, first[0] / self.view.raised / self.view.soft_limit)
         if len(away):
             seen = self._weigh([predictions[0], *(predictions[k + 1] for k in away)], index)
@@ -281,18 +283,18 @@ class Problem:
         return changes
 
     def scaled(self, predictions: Sequence[Channels]) -> list[Channels]:
-        """(measured - predicted) / sd for each trial and channel, neither compressed nor thinned; NaN where missing."""
+        """(measured - predicted) / sd by trial and channel, neither compressed nor thinned; NaN where missing."""
         return [
             {c: (t.channels[c] - p[c]) / self.floor.sd(t, c) for c in t.channels}
             for t, p in zip(self.trials, predictions, strict=True)
         ]
 
     def slopes(self, point: Point) -> list[np.ndarray]:
-        """What a unit of each prediction changes its residual by, one vector a trial, shapes as `residuals`."""
+        """Derivative of each residual with respect to its prediction, one vector per trial, shapes as `residuals`."""
         return self._of_each(point, self._slope)
 
     def _of_each(self, point: Point, finish: Callable[[Channels, int], Any], *, coarse: bool = False) -> list[Any]:
-        """`finish(prediction, index)` of each trial."""
+        """Simulate every trial and return `finish(prediction, index)` for each."""
         structure, theta = self.structure, self.structure.theta(point.values)
         learnt = structure.corrections(theta)
         found: list[Any] = [None] * len(self.trials)
@@ -310,13 +312,13 @@ class Problem:
         return found
 
     def named(self, index: int, nuisances: np.ndarray) -> dict[str, float]:
-        """The nuisances of a trial by their names."""
+        """Nuisances of a trial by name."""
         return {p.name: float(v) for p, v in zip(self.nuisances[index], nuisances, strict=True)}
 
     def _simulate(
         self, places: Sequence[tuple[np.ndarray, np.ndarray]], index: int, *, coarse: bool, alike: bool = False
     ) -> list[Channels]:
-        """Channels of a trial at each of `places`, values and the trial's nuisances."""
+        """Channels of a trial at each of `places`: the structure's values and the trial's nuisances."""
         thetas = [self.structure.theta(values) for values, _ in places]
         corrections = [self.structure.corrections(theta) for theta in thetas]
         for theta, (_, nuisances) in zip(thetas, places, strict=True):
@@ -326,14 +328,14 @@ class Problem:
         )
 
     def _weigh(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
-        """Residuals of each prediction of a trial, a row each."""
+        """Residuals of a trial, a row for each prediction."""
         z, weight = self._looked_at(self._deviations(predictions, index), index)
         limit = self.view.soft_limit * self.view.raised
         return np.arcsinh(z / limit) * (self.view.soft_limit * weight)
 
     def _looked_at(self, z: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """Deviations as the view has them, and the weight of each: blurred, each channel goes through a low-pass over
-        even times, and as many samples of it are kept as it then has anything to say."""
+        """Return the deviations as the view smooths them, and their weights. With blur, every channel is low-pass
+        filtered on an even time grid and decimated accordingly."""
         weight, ends = self._weighing[index].thinning, self._weighing[index].ends
         if not self.view.blur:
             return z, weight
@@ -351,16 +353,16 @@ class Problem:
         return weighing.weight * weighing.thinning / np.hypot(1.0, deviations / self.view.soft_limit)
 
     def _deviations(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
-        """Residuals of each prediction in standard deviations, uncompressed, a row each."""
+        """Uncompressed residuals in standard deviations, a row for each prediction."""
         z = self._samples(predictions, index)
-        with np.errstate(over="ignore"):  # what ran away counts as such below
+        with np.errstate(over="ignore"):  # diverging samples are clipped below
             z -= self._weighing[index].measured
             z *= self._weighing[index].weight
         z[~np.isfinite(z)] = FAILED
         return np.clip(z, -_MOST, _MOST, out=z)
 
     def _samples(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
-        """Of each prediction those that were measured, one channel after the other, a row each."""
+        """Predicted values of the measured samples, one channel after the other, a row for each prediction."""
         channels, keep = self.trials[index].channels, self._weighing[index].keep
         rows = np.empty((len(predictions), len(keep)))
         for row, prediction in zip(rows, predictions, strict=True):
@@ -369,9 +371,9 @@ class Problem:
 
 
 class _Weighing(NamedTuple):
-    """Of a trial's samples, one channel after the other, which ones were measured (`keep`); of these the values, one
-    over their standard deviation, one over the root of the samples in a piece, and where all channels but the last end.
-    """
+    """Weights of a trial's samples, one channel after the other. `keep` marks the samples that were measured; for
+    these: the values, 1 / standard deviation (`weight`), 1 / sqrt(samples per piece) (`thinning`), and the indices at
+    which all channels but the last end."""
 
     keep: np.ndarray
     measured: np.ndarray
@@ -393,20 +395,20 @@ class _Weighing(NamedTuple):
 
 @cache
 def _low_pass(count: int, blur: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of so many samples, taken in pieces: what each sample of a piece adds to the low-passed one at its end, and what
-    is kept at the end of each piece of something before them all."""
+    """Coefficients of a low-pass filter that is evaluated once per block of samples: the contribution of each sample in
+    a block to the filtered value at the block's end, and the decay from the first block's end to each block's end."""
     samples = count * blur
     decay, every = np.exp(-1.0 / max(samples, 1e-3)), max(1, round(samples / 4))
     return (1.0 - decay) * decay ** np.arange(every)[::-1], decay ** (every * np.arange(count // every))
 
 
 def _span(samples: np.ndarray, sd: np.ndarray) -> float:
-    """How large a channel's samples are, noise included."""
+    """Largest magnitude of a channel's samples, at least that of the noise; infinite if nothing was measured."""
     return float(max(np.nanmax(np.abs(samples)), np.max(sd))) if np.isfinite(samples).any() else np.inf
 
 
 def _side_by_side(trials: Sequence[Record], at_once: int) -> list[list[int]]:
-    """Indices of the trials that are simulated together: of one experiment, so many at once; a few go apart."""
+    """Group the indices of trials that are simulated together: up to `at_once` of one experiment, unless too few."""
     experiments: dict[str, list[int]] = {}
     for i, trial in enumerate(trials):
         experiments.setdefault(trial.experiment, []).append(i)
@@ -419,7 +421,7 @@ def _side_by_side(trials: Sequence[Record], at_once: int) -> list[list[int]]:
 
 
 def _stepped(values: np.ndarray, index: int, parameter: Parameter, step: float) -> tuple[np.ndarray, float]:
-    """`values` with one entry moved by `step`, inwards where a bound is near."""
+    """Move one entry of `values` by `step`, or by -`step` if that would cross its upper bound."""
     if values[index] + step > parameter.upper:
         step = -step
     moved = values.copy()

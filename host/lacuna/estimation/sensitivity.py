@@ -1,4 +1,4 @@
-"""Derivatives of one trial's residuals, which learn from every step that is taken (Broyden 1965)."""
+"""Derivatives of one trial's residuals, corrected after every step that is taken (Broyden 1965)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives of n residuals by p parameters of the structure and the trial's own q nuisances.
+    """Derivatives of n residuals with respect to p parameters of the structure and the trial's own q nuisances.
 
-    `taken`, shape (m, n), as finite differences gave them, a row for each of the parameters, of all p + q, that are
-    `felt`: a trial that isolates parameters feels few of them. To them are added the products of `left` (k, n) and
-    `right` (k, p + q) of the steps since. `gram`, shape (p + q, p + q), is of the sum: kept up to date, since the
-    residuals are many.
+    `taken`, shape (m, n), holds the finite differences, a row for each of those of the p + q parameters that the
+    residuals depend on, listed in `felt`; a trial that isolates parameters depends on few of them. The corrections of
+    the k steps since are added as the product of `left`, shape (k, n), and `right`, shape (k, p + q). `gram`, shape
+    (p + q, p + q), is the Gram matrix of the sum, kept up to date because n is large. `structure` is p.
     """
 
     taken: np.ndarray
@@ -27,28 +27,30 @@ class Sensitivity:
 
     @property
     def nuisances(self) -> int:
+        """Number of nuisances, q."""
         return self.gram.shape[0] - self.structure
 
     @classmethod
     def of(cls, taken: np.ndarray, felt: ArrayLike, structure: int, nuisances: int) -> Sensitivity:
+        """Derivatives from finite differences, without corrections."""
         size, felt = structure + nuisances, np.asarray(felt, int)
         gram = np.zeros((size, size))
         gram[np.ix_(felt, felt)] = taken @ taken.T
         return cls(taken, felt, gram, np.zeros((0, taken.shape[1])), np.zeros((0, size)), structure)
 
     def gradient(self, residuals: np.ndarray) -> np.ndarray:
-        """Transposed derivatives times `residuals`, shape (p + q,)."""
+        """Transposed derivatives times `residuals`: the gradient of half their sum of squares, shape (p + q,)."""
         found = (self.left @ residuals) @ self.right
         found[self.felt] += self.taken @ residuals
         return found
 
     def times(self, step: np.ndarray) -> np.ndarray:
-        """What the residuals should change by, shape (n,)."""
+        """Predicted change of the residuals by a step, shape (n,)."""
         return step[self.felt] @ self.taken + (self.right @ step) @ self.left
 
     def corrected(self, step: np.ndarray, scale: np.ndarray, change: np.ndarray) -> Sensitivity:
-        """The least change, counted in scales, by which the derivatives say what the step did. A parameter that the
-        residuals do not feel stays without effect."""
+        """Return the derivatives with the smallest correction, in units of `scale`, that makes them reproduce the
+        observed `change` (Broyden's update). Parameters that the residuals do not depend on stay without effect."""
         felt = np.where(np.diag(self.gram) > 0.0, step / scale**2, 0.0)
         length = float(felt @ step)
         if length == 0.0:
@@ -59,16 +61,16 @@ class Sensitivity:
         return replace(self, gram=gram, left=np.vstack([self.left, missed]), right=np.vstack([self.right, felt]))
 
     def reweighed(self, factors: np.ndarray) -> Sensitivity:
-        """With every residual's derivatives times its own factor, shape (n,)."""
+        """Multiply the derivatives of every residual by its own factor; `factors` has shape (n,)."""
         return self.of(self._rows * factors, self.felt, self.structure, self.nuisances)
 
     def dense(self) -> tuple[np.ndarray, np.ndarray]:
-        """By the structure's parameters, shape (n, p), and by the nuisances, shape (n, q)."""
+        """Derivatives with respect to the structure's parameters, shape (n, p), and the nuisances, shape (n, q)."""
         whole = np.zeros((self.gram.shape[0], self.taken.shape[1]))
         whole[self.felt] = self._rows
         return whole[: self.structure].T, whole[self.structure :].T
 
     @property
     def _rows(self) -> np.ndarray:
-        """`taken` with what the steps since have taught."""
+        """`taken` with the corrections of the steps since."""
         return self.taken + self.right[:, self.felt].T @ self.left if len(self.left) else self.taken

@@ -1,10 +1,11 @@
-"""The last steps of a fit, with derivatives good enough to say how well its parameters are known.
+"""The last steps of a fit, with derivatives accurate enough for the uncertainty of its parameters.
 
-While a fit is far away, small steps of one parameter at a time do. At its end they do not: parameters that act almost
-alike (both frictions and the wall's place) are told apart by the little that is left of their derivatives once the
-others are taken out, and that is then mostly the simulation's own error, which passes for information. Here every step
-goes along a principal direction of what is known and is one standard deviation long, nuisances following, so that the
-residuals change by as much in the least certain direction as in the surest.
+Far from the optimum, differences by small steps of one parameter at a time suffice. At the optimum they do not:
+parameters that act almost alike (both frictions and the wall's position) are distinguished only by the small part of
+their derivatives that is left once the others are projected out, and that part is then mostly simulation error, which
+passes for information. Here every step goes along a principal direction of the information matrix and is one standard
+deviation long, with the nuisances refitted to first order, so that the residuals change as much in the least certain
+direction as in the most certain one.
 """
 
 from __future__ import annotations
@@ -20,19 +21,19 @@ from lacuna.estimation.sensitivity import Sensitivity
 from lacuna.estimation.solve import Solution, one_thread, solve
 
 _ROUNDS = 6
-_STEPS = 20  # a round: cheap beside its derivatives
-_ENOUGH = 1.0  # log-likelihood: after a round that gains less, derivatives from where it began still hold
-# Of the square of what a step should change. Less: it was too short, and its derivative is mostly error. More: it met a
-# jump (a foot that slips a sample sooner).
+_STEPS = 20  # per round; cheap compared with its derivatives
+_ENOUGH = 1.0  # log-likelihood: after a round that gains less, derivatives from its beginning still hold
+# Squared change of the residuals over the expected one. Below: the step was too short, and its derivative is mostly
+# error. Above: it met a jump (a foot that slips a sample sooner).
 _PREDICTED = (0.5, 4.0)
-_LONGEST = 1.0  # scales that a derivative may step, where the data leave a direction open
+_LONGEST = 1.0  # scales: longest step of a derivative, in directions that the data leave open
 
 
 @dataclass(frozen=True)
 class _Directions:
-    """Where derivatives step. `structure`, shape (P, P): in the free parameters, a direction a column. Of each trial:
-    `following`, shape (q, P), what its nuisances do meanwhile, and `spread`, shape (q,), by how much each moves alone.
-    """
+    """Steps of the derivatives. `structure`, shape (P, P): steps in the free parameters, a direction per column. For
+    each trial, `following`, shape (q, P): the accompanying steps of its nuisances; `spread`, shape (q,): the steps of
+    each nuisance alone."""
 
     structure: np.ndarray
     following: tuple[np.ndarray, ...]
@@ -41,9 +42,9 @@ class _Directions:
 
 @one_thread
 def settle(fitted: Fit) -> Fit:
-    """The fit at its optimum, with derivatives and a normal matrix to be trusted. A round costs P simulations of all
-    trials; there are one to six, two as a rule. A fit that is stopped by a bound stays as it is: the model is wrong;
-    and so does one with a parameter that acts in steps, which are longer than these."""
+    """Return the fit at its optimum, with accurate derivatives and normal matrix. A round costs P simulations of all
+    trials; there are one to six, usually two. A fit that a bound has stopped is returned unchanged, since its model is
+    wrong, and so is one with a parameter that acts in steps, which are wider than the steps used here."""
     problem = fitted.problem
     if problem.structure.grains().any():
         return fitted
@@ -58,7 +59,7 @@ def settle(fitted: Fit) -> Fit:
         ahead = solve(problem, solution.point, max_iterations=_STEPS, **options)
         trusted = _as_predicted(along, solution.normal, here.normal)
         converged = trusted and here.cost - ahead.cost < _ENOUGH
-        # The steps' own corrections would bring the simulation's error back in.
+        # derivatives corrected by the steps would reintroduce the simulation error
         fitted = replace(fitted, solution=replace(here, point=ahead.point, cost=ahead.cost, converged=converged))
         if converged:
             break
@@ -82,8 +83,8 @@ def _directions(problem: Problem, solution: Solution) -> _Directions:
 
 
 def _room(problem: Problem, solution: Solution, directions: np.ndarray) -> np.ndarray:
-    """What to multiply each direction by so that its step stays within the bounds, -1 to 1: the other way round where
-    there is more room."""
+    """Factor for each direction, -1 to 1, that keeps its step within the bounds; negative if there is more room the
+    other way."""
     free = list(solution.free)
     values = solution.point.values[free]
     lower, upper = (bound[free] for bound in problem.structure.bounds(solution.point.values))
@@ -97,14 +98,15 @@ def _room(problem: Problem, solution: Solution, directions: np.ndarray) -> np.nd
 
 
 def _as_predicted(along: _Directions, before: np.ndarray, after: np.ndarray) -> bool:
-    """Whether steps along the directions changed the residuals about as much as they were meant to."""
+    """Whether steps along the directions changed the residuals about as much as expected."""
     meant, seen = (np.einsum("pk,pq,qk->k", along.structure, normal, along.structure) for normal in (before, after))
-    whole = meant > 0.5  # others stopped short of a standard deviation, because the data leave them open
+    whole = meant > 0.5  # others were cut short, because the data leave them open
     return bool(((seen > _PREDICTED[0] * meant) & (seen < _PREDICTED[1] * meant))[whole].all())
 
 
 def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _Directions) -> list[Sensitivity]:
-    """Of every trial by the free parameters and by its nuisances, from differences along the directions."""
+    """Derivatives of each trial with respect to the free parameters and its nuisances, from differences along the
+    directions."""
     values = np.tile(point.values, (len(free), 1))
     values[:, list(free)] += along.structure.T
     back = np.linalg.inv(along.structure)

@@ -1,9 +1,9 @@
-"""Learnt curves that are no larger where the data say nothing than where they speak.
+"""Shrink learnt curves where the data do not determine them to the size that they have where the data do.
 
-The prior of a curve is wide, so that none is held back before its size is known. Where no trial went it would let the
-curve swing as far as its slope leads, and say that it may be anything there. Once the curve is learnt, the data tell
-its size, and that is what is expected of the rest (empirical Bayes; the update is MacKay's, Bayesian interpolation,
-1992).
+The prior of a curve is wide, so that no curve is shrunk before its size is known. Outside the range of the trials, such
+a prior would let the curve extrapolate with its slope and leave its value there almost unconstrained. Once the curve is
+learnt, the data determine its size, which then becomes the prior for the rest (empirical Bayes with MacKay's update;
+Bayesian interpolation, 1992).
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from lacuna.estimation.structure import knot_name
 from lacuna.estimation.uncertainty import uncertainty
 
 _UPDATES = 100
-_NONE = 1e-3  # scales of a site: the size of a curve that is but noise
-_TOLD = 0.5  # of a knot's variance beforehand: where the data leave less, they speak
+_NONE = 1e-3  # scales of a site: smallest size, that of a curve that is only noise
+_TOLD = 0.5  # of a knot's prior variance: the data determine a knot if its posterior variance is smaller
 
 
 def shrunk(fitted: Fit) -> Fit:
-    """The fit with the knots of each learnt curve known beforehand to within its size, at zero where the data do not
-    speak, and all else following by the derivatives that there are."""
+    """Return the fit with the likeliest size of each learnt curve as the prior of its knots. Knots that the data do not
+    determine restart at zero, and everything else is refitted with the existing derivatives."""
     structure, solution = fitted.structure, fitted.solution
     if not structure.sites:
         return fitted
@@ -42,8 +42,8 @@ def shrunk(fitted: Fit) -> Fit:
 
 
 def likeliest_size(values: np.ndarray, covariance: np.ndarray, least: float) -> tuple[float, np.ndarray]:
-    """The standard deviation of which `values` (n,), known to within `covariance`, are the likeliest draw, or `least`;
-    and which of them the data tell then."""
+    """Return the standard deviation, at least `least`, that makes `values`, shape (n,), known with `covariance`, the
+    likeliest draw, and a mask of the values that the data then determine."""
     variances, ways = np.linalg.eigh(covariance)
     variances, along = np.maximum(variances, 0.0), (ways.T @ values) ** 2
     square = max(float(np.mean(values**2)), least**2)

@@ -1,4 +1,4 @@
-"""Bounded Levenberg-Marquardt for a `Problem`: the structure's vector and every trial's nuisances together."""
+"""Bounded Levenberg-Marquardt for a `Problem`, over the structure's vector and every trial's nuisances together."""
 
 from __future__ import annotations
 
@@ -19,26 +19,28 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def one_thread(function: _Function) -> _Function:
-    """Decorates what leaves the cores to trials: linear algebra has one thread in it."""
+    """Decorator that limits BLAS to one thread within `function`, since the cores are used to simulate trials."""
     alone: _Function = _controller.wrap(limits=1, user_api="blas")(function)
     return alone
 
 
-ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
-RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
-_STRAY_SDS = 10.0  # that a nuisance may: nearer its prior holds it, and a bound would hold the parameters, too,
-_ALONE_SDS = 4.0  # but where nothing else is free, or it would stand in for what the model lacks
-_REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
+ENOUGH = 0.02  # log-likelihood: a step with a smaller predicted gain is not taken
+RELATIVE = 2e-5  # the same relative to the cost, since far above the floor less accuracy is needed
+# Bounds of a nuisance, in standard deviations from its mean. Wide, since its prior holds it and a tighter bound would
+# constrain the parameters as well; narrower if nothing else is free, or it would stand in for what the model lacks.
+_STRAY_SDS = 10.0
+_ALONE_SDS = 4.0
+_REACH = 50.0  # scales that a parameter may move in one step, beyond which its derivatives mean nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
-_TRUSTED = 0.25  # of what a step promised: derivatives that predict less are recomputed
-_PREDICTED = 0.5  # of what it promised: a small step that kept so much of it ends the search with old derivatives too
-_OLDEST = 8  # steps that derivatives serve at most
+_TRUSTED = 0.25  # actual over predicted gain of a step below which derivatives are recomputed
+_PREDICTED = 0.5  # the same, above which a small step ends the search even with old derivatives
+_OLDEST = 8  # steps after which derivatives are recomputed in any case
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Where a minimisation ended: cost is minus the log posterior; `normal` the Gauss-Newton matrix, shape
-    (P, P), of the free parameters with the nuisances eliminated, in the order of `free`."""
+    """Result of a minimisation. `cost` is minus the log posterior; `normal`, shape (P, P), is the Gauss-Newton matrix
+    of the free parameters with the nuisances eliminated, in the order of `free`."""
 
     point: Point
     cost: float
@@ -49,11 +51,13 @@ class Solution:
 
     @property
     def jacobians(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each trial's residuals by the free parameters and by its nuisances, shapes (n, P) and (n, q)."""
+        """Derivatives of each trial's residuals with respect to the free parameters and to its nuisances, shapes (n, P)
+        and (n, q)."""
         return [s.dense() for s in self.sensitivities]
 
 
 def cost_of(problem: Problem, point: Point) -> float:
+    """Minus the log posterior at `point`, up to a constant."""
     return 0.5 * sum(float(r @ r) for r in problem.residuals(point)) + problem.prior_cost(point)
 
 
@@ -67,11 +71,11 @@ def solve(
     sensitivities: Sequence[Sensitivity] | None = None,
     relative: float = RELATIVE,
 ) -> Solution:
-    """Minimise the cost from `start` over the parameters `free` (indices; default all) and all nuisances.
+    """Minimise the cost from `start` over the parameters `free` (indices; default: all) and all nuisances.
 
-    Derivatives are recomputed only where the last ones, corrected after every step by what it showed (Broyden
-    1965), no longer predict what a step does. With `sensitivities` given (of `free`, from somewhere near) they are
-    never taken: cheap steps. The search ends where the next step promises less than `relative` of the cost.
+    Derivatives are corrected after every step (Broyden 1965) and recomputed only when they no longer predict the effect
+    of a step. If `sensitivities` are given (for `free`, from a nearby point), they are never recomputed, which makes
+    steps cheap. The search ends when the predicted gain of the next step is below `relative` times the cost.
     """
     free = tuple(range(len(problem.structure.names)) if free is None else free)
     lower, upper, _ = _limits(problem, start, free)
@@ -81,7 +85,7 @@ def solve(
     if sensitivities is None:
         sensitivities = problem.jacobians(here.point, free, steps)
     damping, converged = _LAMBDA_START, False
-    age = 0  # steps since the derivatives were taken
+    age = 0  # steps since the derivatives were computed
     for _ in range(max_iterations):
         there, kept, damping, little = _descended(
             problem, here, free, sensitivities, damping, relative, once=age > 0 and not keep
@@ -108,7 +112,7 @@ def solve(
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a search stands: the point, as it is and as one vector, and what it costs."""
+    """Current state of a search: the point, also as one vector `x`, with its residuals and cost."""
 
     point: Point
     x: np.ndarray
@@ -117,7 +121,8 @@ class _Place:
 
     @classmethod
     def at(cls, problem: Problem, old: Point, free: tuple[int, ...], x: np.ndarray) -> _Place:
-        """At `x`, with what is not free as at `old`, and no parameter below one that it cannot be below."""
+        """Evaluate the point `x`; parameters that are not free keep their values in `old`, and ordered parameters
+        (`Parameter.at_least`) are raised to their limits."""
         values = old.values.copy()
         values[list(free)] = x[: len(free)]
         nuisances = tuple(x[own] for own in _own_places(map(len, old.nuisances), len(free)))
@@ -135,9 +140,9 @@ def _descended(
     *,
     once: bool,
 ) -> tuple[_Place | None, float, float, bool]:
-    """Where a step from `here` leads down, damped the more the oftener it did not (one try where derivatives are old,
-    `once`), and how much it kept of what it promised; the damping for the next; and whether the last step tried
-    promised too little to be worth it."""
+    """Find a step from `here` that lowers the cost, increasing the damping after every failure (`once`: a single try,
+    for old derivatives). Returns the new place or None, the ratio of actual to predicted gain, the damping for the next
+    step, and whether the predicted gain of the last step tried was too small to be worth taking."""
     system = _linearize(problem, here, free, sensitivities)
     lower, upper, scale = _limits(problem, here.point, free)
     reach = _REACH * scale
@@ -184,7 +189,7 @@ def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.n
 
 
 def _may_be(nuisance: Parameter, sds: float) -> tuple[float, float]:
-    """The range of a nuisance, so many standard deviations of its spread to either side."""
+    """Range of a nuisance: `sds` standard deviations to either side of its mean, within its bounds."""
     if nuisance.periodic:
         return -np.inf, np.inf
     strays = sds * nuisance.step_scale
@@ -196,15 +201,14 @@ def _pack(point: Point, free: tuple[int, ...]) -> np.ndarray:
 
 
 def _own_places(counts: Iterable[int], p: int) -> list[slice]:
-    """Where each trial's so many nuisances stand in a vector that begins with the p free parameters."""
+    """Slices of each trial's nuisances, `counts` of them, in a vector that begins with the p free parameters."""
     return [slice(begin, end) for begin, end in pairwise(accumulate(counts, initial=p))]
 
 
 def _linearize(
     problem: Problem, here: _Place, free: tuple[int, ...], sensitivities: Sequence[Sensitivity]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Normal matrix and gradient of the Gauss-Newton system: structure first, then the trials' nuisances one after the
-    other."""
+    """Normal matrix and gradient of the Gauss-Newton system: free parameters first, then each trial's nuisances."""
     point, p = here.point, len(free)
     size = p + sum(len(n) for n in point.nuisances)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
@@ -237,11 +241,11 @@ def _step(
     scale: np.ndarray,
     damping: float,
 ) -> tuple[np.ndarray, float]:
-    """A damped step within the bounds and the decrease of the quadratic model that it promises."""
+    """Return a damped step within the bounds, and the decrease of the cost that the quadratic model predicts for it."""
     ridge = damping * np.maximum(np.diag(normal), 1e-6 / scale**2) + 1e-9 / scale**2
     stopped = np.zeros(len(x), bool)
     step = np.zeros(len(x))
-    for _ in range(8):  # those that would cross a bound stop there, the others are solved again
+    for _ in range(8):  # unknowns that would cross a bound stop there, and the others are solved for again
         active = ~stopped
         if not active.any():
             break
@@ -259,5 +263,5 @@ def _step(
 
 
 def _eliminate(normal: np.ndarray, p: int) -> np.ndarray:
-    """The normal matrix of the first p unknowns with the others marginalised (Schur complement)."""
+    """Normal matrix of the first p unknowns with the others marginalised (Schur complement)."""
     return normal[:p, :p] - normal[:p, p:] @ np.linalg.solve(normal[p:, p:], normal[p:, :p])

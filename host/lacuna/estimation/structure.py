@@ -1,4 +1,4 @@
-"""What is fitted: the base model, some effects of the library, and curves learnt at some sites, as one vector."""
+"""The fitted parameters as one vector: those of the base model, some effects of the library, and learnt curves."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ from scipy.interpolate import CubicSpline
 
 from lacuna.system import LEARNT, Correction, CorrectionSite, Parameter, Record, System, Theta
 
-_RELEASED = 20.0  # times its standard deviation: a prior that hardly counts, and yet holds what nothing else does
-_TABLE_INTERVALS = 64  # at least
+_RELEASED = 20.0  # widens a relaxed prior: it hardly counts, but still holds what the data do not determine
+_TABLE_INTERVALS = 64  # of a tabulated curve, at least
 
 
 @dataclass(frozen=True)
 class Structure:
-    """The base model of a system plus `effects` plus corrections at `sites`; the order of the fitted vector
-    is base, effects, corrections."""
+    """The base model of a system, plus `effects`, plus corrections at `sites`. The fitted vector is in this order."""
 
     system: System
     effects: tuple[str, ...] = ()
@@ -39,11 +38,11 @@ class Structure:
         return tuple(p.name for p in self.parameters)
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
-        """What varies from run to run, with the effects' own parameters of this trial last."""
+        """Nuisances of a trial, followed by the effects' own parameters in this trial."""
         return (*self.system.nuisances(trial), *self.own(trial))
 
     def own(self, trial: Record) -> tuple[Parameter, ...]:
-        """The effects' parameters of which this trial has its own value: anywhere, if nothing is said of its spread."""
+        """Effects' parameters with a separate value in this trial; without a `scale`, spread over their whole range."""
         return tuple(
             replace(p, name=effect.full_name(p), scale=p.scale or 0.25 * (p.upper - p.lower))
             for effect in (self.system.effects[name] for name in self.effects)
@@ -56,7 +55,7 @@ class Structure:
         return len(self.system.parameters)
 
     def start(self) -> np.ndarray:
-        """Start of the base, effects absent (their size at its null, other parameters typical), corrections zero."""
+        """Initial vector: the base at its start, effects absent with typical shape parameters, corrections zero."""
         effects = [self.system.effects[name] for name in self.effects]
         return self.values({size: effect.absent for effect in effects for size in effect.size_names})
 
@@ -64,22 +63,22 @@ class Structure:
         return np.array([p.value for p in self.parameters])
 
     def bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the parameters lie between, the others being as in `values`."""
+        """Lower and upper bounds, given that ordered parameters are limited by those in `values`."""
         lower, upper = np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
         for index, floor in self.ordered:
             lower[index] = max(lower[index], values[floor])
         return lower, upper
 
     def lifted(self, values: np.ndarray) -> np.ndarray:
-        """`values` with those raised that are below the one that they cannot be below."""
+        """Return `values` with ordered parameters raised to their limits (`Parameter.at_least`)."""
         values = values.copy()
         for index, floor in self.ordered:
             values[index] = max(values[index], values[floor])
         return values
 
     def parted(self, values: np.ndarray, effect: str) -> np.ndarray:
-        """`values` with the parameters that `effect` needs apart (`Effect.apart`) at least half as far above what they
-        cannot be below as they are at the start."""
+        """Return `values` with the parameters in `Effect.apart` raised to at least half their initial distance above
+        their limits (`Parameter.at_least`)."""
         values, start = values.copy(), self.start()
         for index, floor in self.ordered:
             if self.names[index] in self.system.effects[effect].apart:
@@ -102,18 +101,20 @@ class Structure:
         return dict(zip(self.names, values.tolist(), strict=True))
 
     def values(self, theta: Theta) -> np.ndarray:
-        """The vector for `theta`; what it lacks stands at the start."""
+        """Return the vector for `theta`; parameters that it lacks have their initial values."""
         return np.array([theta.get(p.name, p.value) for p in self.parameters])
 
     def corrections(self, theta: Theta) -> tuple[Correction, ...]:
-        """The learnt curves, knots interpolated by a natural cubic spline onto a uniform table."""
+        """Return the learnt curves, interpolated from their knots onto a uniform table by a natural cubic spline."""
         return tuple(_tabulate(self.system.correction_sites[name], theta) for name in self.sites)
 
     def prior_precision(self, released: bool = False, sizes: Mapping[str, float] | None = None) -> np.ndarray:
-        """Precision of the prior around the parameters' starts, shape (P, P): what was known of each, and for learnt
-        curves knots within 10 scales of zero, or within the size of the curve at a site if `sizes` has it, and bending
-        within 3 scales a knot. `released`: what was known from the trials themselves hardly counts, or they would count
-        twice."""
+        """Precision of the prior around the initial values, shape (P, P).
+
+        It holds the declared priors, and for learnt curves knots within 10 scales of zero (or within the site's entry
+        in `sizes`) and second differences within 3 scales. `released` relaxes priors that were estimated from the
+        trials themselves, so that these do not count twice.
+        """
         wider = [_RELEASED if released and p.prior_from_trials else 1.0 for p in self.parameters]
         sds = zip((p.prior_sd for p in self.parameters), wider, strict=True)
         precision = np.diag([(sd * factor) ** -2.0 if sd else 0.0 for sd, factor in sds])
@@ -128,7 +129,7 @@ class Structure:
         return precision
 
     def moves(self, index: int, trial: Record) -> bool:
-        """Whether parameter `index` can change a trial at all."""
+        """Whether parameter `index` can change a trial."""
         if index < self.base_size:
             return self.system.matters(self.names[index], trial)
         owner = self.names[index].split(".")
@@ -141,12 +142,12 @@ class Structure:
 
 
 def is_learnt(name: str) -> bool:
-    """Whether this parameter is a knot of a learnt curve."""
+    """Whether `name` is that of a knot of a learnt curve."""
     return name.startswith(f"{LEARNT}.")
 
 
 def knot_name(site: CorrectionSite, row: int, knot: int) -> str:
-    """The parameter's."""
+    """Name of the parameter for a knot of a learnt curve."""
     return f"{LEARNT}.{site.name}.{row}_{knot}"
 
 
@@ -167,8 +168,8 @@ def _tabulate(site: CorrectionSite, theta: Mapping[str, float]) -> Correction:
 
 @cache
 def _splines(knots: int) -> np.ndarray:
-    """Of each knot the natural cubic spline that is 1 there and 0 at the others, on the table's grid: a curve is their
-    sum. Shape (knots, n)."""
-    each = max(_TABLE_INTERVALS // (knots - 1), 2)  # intervals of the table between two knots
+    """Basis of natural cubic splines on the table's grid, shape (knots, n): row k is 1 at knot k and 0 at the others.
+    A curve is their sum, weighted by its knots."""
+    each = max(_TABLE_INTERVALS // (knots - 1), 2)  # intervals of the table between neighbouring knots
     at = np.linspace(0, 1, each * (knots - 1) + 1)
     return CubicSpline(np.linspace(0, 1, knots), np.eye(knots), bc_type="natural")(at).T

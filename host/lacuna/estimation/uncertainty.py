@@ -1,10 +1,11 @@
-"""How well a fit knows its parameters: intervals, correlations, and what the data cannot determine.
+"""Uncertainty of fitted parameters: intervals, correlations, and what the data cannot determine.
 
-A hundred thousand samples make the quadratic intervals absurdly narrow: they count every sample as fresh evidence, and
-a model that is wrong by a hundredth of a newton is wrong in all of them alike. What different conditions (another
-pressure, another gait) say about a parameter tells more: the jackknife over conditions, to first order (CR3: Bell and
-McCaffrey 2002; MacKinnon, Nielsen and Webb 2023). The plain sandwich (Liang and Zeger 1986) takes the residual of a
-condition for its error, though the fit has bent towards it, and of the few that there are it leaves too little.
+With a hundred thousand samples, intervals from the curvature of the cost are absurdly narrow: they count every sample
+as independent evidence, although a model that is wrong by a hundredth of a newton is wrong in all of them alike. The
+spread of a parameter between conditions (another pressure, another gait) is more informative. It is estimated by the
+jackknife over conditions, to first order (CR3: Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023). The plain
+sandwich (Liang and Zeger 1986) takes a condition's residual for its error, although the fit has adapted to it, and so
+underestimates the variance when conditions are few.
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ from lacuna.estimation.solve import solve
 from lacuna.system import Record
 
 CONFIDENCE = 0.9  # of every interval
-_UNDETERMINED = 3.0  # a direction whose standard deviation exceeds this many scales is not determined
-_REFITTED = 8  # iterations, beside a parameter that is moved
-_KNOWN = 1e-9  # of the best known direction's information: less is rounding
-_LEFT = 0.1  # of a direction's information: to first order nothing follows from what is left of less
+_UNDETERMINED = 3.0  # scales: a direction with a larger standard deviation is not determined
+_REFITTED = 8  # iterations of the other parameters at each step of a profile
+_KNOWN = 1e-9  # of the best determined direction's information; less is rounding error
+_LEFT = 0.1  # of a direction's information that is taken to remain at least, since first order fails below it
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter of a fit, with the standard deviation of its value. `at_bound` and `implausible` are words of
-    warning: the first that the search was stopped, the second that the model is probably wrong."""
+    """Estimate of one parameter, with its standard deviation. Two flags are warnings: `at_bound`, that a bound stopped
+    the search, and `implausible`, that the model is probably wrong."""
 
     name: str
     unit: str
@@ -43,8 +44,8 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """`covariance`, shape (P, P), in the order of `estimates`; `undetermined`: combinations of parameters, as
-    {name: weight}, that the data leave open."""
+    """Uncertainty of a fit. `covariance` has shape (P, P), in the order of `estimates`; `undetermined` lists the
+    combinations of parameters, as {name: weight}, that the data leave open."""
 
     estimates: tuple[Estimate, ...]
     covariance: np.ndarray
@@ -61,9 +62,8 @@ class Uncertainty:
 
 
 def uncertainty(fitted: Fit) -> Uncertainty:
-    """How well all fitted parameters are known, by the curvature of the cost. The mean weighted square residual
-    inflates the covariance where it is above 1: a model that does not fit does not claim to know its parameters well.
-    """
+    """Uncertainty of all fitted parameters from the curvature of the cost. The covariance is multiplied by the mean
+    weighted square residual if that exceeds 1, so that a model that does not fit gets wide intervals."""
     structure, solution = fitted.structure, fitted.solution
     scales = structure.scales()[list(solution.free)]
     normal = solution.normal * np.outer(scales, scales)
@@ -98,8 +98,8 @@ def uncertainty(fitted: Fit) -> Uncertainty:
 
 
 def profile_interval(fitted: Fit, name: str) -> tuple[float, float]:
-    """Profile-likelihood interval of one parameter: how far it can move, all others refitted, before the
-    likelihood ratio forbids it. Costs about 10 refits; for parameters whose cost is not a parabola."""
+    """Profile-likelihood interval of one parameter: how far it can move, with all others refitted, before the
+    likelihood ratio rejects it. For parameters whose cost is not a parabola; costs about 10 refits."""
     structure, solution = fitted.structure, fitted.solution
     index = structure.names.index(name)
     position = solution.free.index(index)
@@ -113,8 +113,8 @@ def profile_interval(fitted: Fit, name: str) -> tuple[float, float]:
 
 
 def _walk_out(fitted: Fit, index: int, others: tuple[int, ...], stride: float, bound: float, limit: float) -> float:
-    """Step outwards until the cost has risen by `limit`, then interpolate the square root of the rise,
-    which is straight where the cost is a parabola."""
+    """Step outwards until the cost has risen by `limit`, then interpolate the square root of the rise, which is linear
+    where the cost is a parabola."""
     here, rise, point = float(fitted.solution.point.values[index]), 0.0, fitted.solution.point
     for _ in range(8):
         ahead = here + stride
@@ -133,12 +133,12 @@ def _walk_out(fitted: Fit, index: int, others: tuple[int, ...], stride: float, b
 
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
-    """90 % interval of every parameter of a settled fit, within its bounds: by the curvature of the likelihood or by
-    what conditions disagree about, whichever is wider; Student's t with as many degrees of freedom as conditions, less
-    one."""
+    """90 % interval of every parameter of a settled fit, within its bounds: from the curvature of the likelihood or
+    from the disagreement between conditions, whichever is wider, with Student's t for one degree of freedom less than
+    there are conditions."""
     known = uncertainty(fitted)
     variance = np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fitted)))
-    variance += fitted.structure.grains()[list(fitted.solution.free)] ** 2 / 12.0  # anywhere within a step
+    variance += fitted.structure.grains()[list(fitted.solution.free)] ** 2 / 12.0  # uniform within a step
     conditions = len({(t.experiment, t.condition) for t in fitted.problem.trials})
     half = np.sqrt(variance) * stdtrit(max(conditions - 1, 1), 0.5 + CONFIDENCE / 2)
     found = {}
@@ -150,9 +150,9 @@ def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
 
 
 def clustered_covariance(fit: Fit) -> np.ndarray:
-    """Jackknife covariance of the free parameters, shape (P, P), by experiment and condition: how far the optimum moves
-    where one of them is left out. A direction that a single condition shows nearly alone, whose move is no matter of
-    first order, moves as if a tenth of what is known of it were left."""
+    """Jackknife covariance of the free parameters, shape (P, P), from how far the optimum moves when one condition of
+    an experiment is left out. First order fails for a direction that a single condition determines almost alone; it
+    moves as if a tenth of its information remained."""
     solution = fit.solution
     units = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
     scores: dict[object, np.ndarray] = {}
@@ -166,20 +166,20 @@ def clustered_covariance(fit: Fit) -> np.ndarray:
         return np.zeros_like(solution.normal)
     values, vectors = np.linalg.eigh(solution.normal / np.outer(units, units))
     kept = values > _KNOWN * values.max()
-    root = vectors[:, kept] / np.sqrt(values[kept])  # of the covariance: in its coordinates all is known equally well
+    root = vectors[:, kept] / np.sqrt(values[kept])  # of the covariance; whitens the parameters
     moves = np.array([root @ _moved(root.T @ normals[key] @ root, root.T @ scores[key]) for key in scores])
     return (clusters - 1) / clusters * moves.T @ moves / np.outer(units, units)
 
 
 def _moved(share: np.ndarray, score: np.ndarray) -> np.ndarray:
-    """By how much the optimum moves without a condition that has `share`, (P, P), of all information."""
+    """Shift of the optimum without a condition that contributes `share`, shape (P, P), of all information."""
     left, directions = np.linalg.eigh(np.eye(len(share)) - share)
     return directions @ (directions.T @ score / np.maximum(left, _LEFT))
 
 
 def _evidence(fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """What each trial pulls the free parameters by, shape (P,), and knows of them, shape (P, P), less what its own
-    nuisances would take up: these need only be near their best values then."""
+    """Score, shape (P,), and information, shape (P, P), of each trial about the free parameters, with its own nuisances
+    eliminated, so that these need only be close to their optimum."""
     problem, solution = fit.problem, fit.solution
     scores, normals = [], []
     residuals = problem.residuals(solution.point)
@@ -196,12 +196,12 @@ def _evidence(fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
 
 
 def effective_samples(fitted: Fit) -> float:
-    """Independent pieces of information in the fitted trials."""
+    """Number of independent pieces of information in the fitted trials."""
     return sum(pieces_of(trial, fitted.problem.floor) for trial in fitted.problem.trials)
 
 
 def pieces_of(trial: Record, floor: NoiseFloor) -> float:
-    """Independent pieces of information in one trial."""
+    """Number of independent pieces of information in one trial."""
     return sum(np.isfinite(v).sum() / floor.samples_per_piece(trial, c) for c, v in trial.channels.items())
 
 

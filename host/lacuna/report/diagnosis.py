@@ -1,4 +1,4 @@
-"""The page of one diagnosis: verdict, evidence, error before and after, what to measure next."""
+"""HTML page of one diagnosis: verdict, evidence, errors before and after, and the next experiment."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from lacuna.report.sentence import next_in_words, number_in_words, own_form, sha
 
 
 def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None = None) -> Page:
-    """The page for a `record` (of `as_record`); with the diagnosis itself also what was measured, and traces."""
+    """Return the page for a `record` (from `as_record`). If the diagnosis `found` is given, the page also describes the
+    measurements and shows traces."""
     error, effects = record["error"], record["effects"]
     meanings = {
         "before": "error of the base model on trials not fitted, in units of the noise",
@@ -85,7 +86,7 @@ def _learnt(curve: Mapping[str, Any]) -> Section:
 
 
 def _open(record: Mapping[str, Any]) -> list[Section]:
-    """What the data do not show, or cannot tell apart, and what would tell."""
+    """Sections on effects that the data would not show or cannot distinguish, and on the next experiment."""
     sections = []
     if hidden := record["not_detectable_here"]:
         sections.append(Section("Not detectable in this data", (", ".join(hidden),)))

@@ -1,5 +1,5 @@
-"""Figures of a diagnosis: the verdict in one, errors, what was tried, effects' weights, learnt curves, and measured
-against predicted where nothing was fitted."""
+"""Figures of a diagnosis: an overview, errors, explanations tried, weights of effects, learnt curves, and measured and
+predicted traces of held-out records."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TRIED = 6
 
 
 def overview(record: Mapping[str, Any], diagnosis: Diagnosis) -> Any:
-    """The figure, on whatever display Matplotlib has."""
+    """Return the overview of a verdict, drawn with the current Matplotlib backend."""
     with look() as palette:
         import matplotlib.pyplot as plt
 
@@ -33,22 +33,22 @@ def overview(record: Mapping[str, Any], diagnosis: Diagnosis) -> Any:
 
 
 def draw_held_out(diagnosis: Diagnosis, stream: BytesIO, dark: bool = False) -> None:
-    """Measured and predicted, and the residual, of the records that were predicted worst before."""
+    """Draw measured and predicted traces, and residuals, of the records that the base model predicts worst."""
     shown = _held_out(diagnosis)[: _SHOWN + 1]
     size = (9.0, 1.9 * len(shown))
-    with drawn(stream, dark, size, len(shown), 2, squeeze=False, layout="constrained") as (axes, palette):
+    with drawn(stream, dark, size, len(shown), 2, squeeze=False) as (axes, palette):
         for k, (pair, one) in enumerate(zip(axes, shown, strict=True)):
             _traces_on(list(pair), palette, one, k == 0)
 
 
 def draw_tried(record: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
-    """What each explanation tried leaves, on a logarithmic axis."""
+    """Draw the error that each explanation tried leaves, on a logarithmic axis."""
     with drawn(stream, dark, (7.2, 0.4 * min(len(record["tried"]), _TRIED) + 1.2)) as (axis, palette):
         _tried_on(axis, palette, record)
 
 
 def _tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
-    """Bars: the error of the base model and of the best explanations tried; a line: the floor."""
+    """Draw the errors of the base model and of the best explanations tried as bars, and the floor as a line."""
     tried = [one for one in record["tried"] if one["effects"]][:_TRIED]
     base = [one for one in record["tried"] if not one["effects"]]
     rows = [*base, *tried] or [{"effects": [], "error": record["error"]["before"]["fitted"]}]
@@ -65,9 +65,9 @@ def _tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
 
 
 def draw_errors(error: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
-    """Before against after, against the floor, on a logarithmic axis.
+    """Draw errors before and after, and the noise floor, on a logarithmic axis.
 
-    error: the `error` object of `bifa diagnose --json` (contracts, section 5), RMS in units of the noise.
+    `error`: the `error` object of `bifa diagnose --json`, RMS in units of the noise.
     """
     before, after = _bars(error["before"]), _bars(error["after"])
     names = [name for name in before if name in after]
@@ -88,7 +88,7 @@ def draw_errors(error: Mapping[str, Any], stream: BytesIO, dark: bool = False) -
 
 
 def draw_weights(effects: Sequence[Mapping[str, Any]], stream: BytesIO, dark: bool = False) -> None:
-    """The weight of each effect named (`effects` of `bifa diagnose --json`), confusable ones beside it."""
+    """Draw the weight of each named effect (`effects` of `bifa diagnose --json`), annotated with confusable ones."""
     with drawn(stream, dark, (7.2, 0.5 * max(len(effects), 1) + 0.9)) as (axis, palette):
         rows = np.arange(len(effects))[::-1]
         axis.barh(rows, [effect["probability"] for effect in effects], height=0.55, color=palette.after)
@@ -103,7 +103,7 @@ def draw_weights(effects: Sequence[Mapping[str, Any]], stream: BytesIO, dark: bo
 
 
 def draw_learnt(curve: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
-    """A curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
+    """Draw a curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
     with drawn(stream, dark, (7.2, 2.4)) as (axis, palette):
         axis.axhline(0.0, color=palette.quiet, linewidth=0.8)
         for row, values in curve["rows"].items():
@@ -115,7 +115,7 @@ def draw_learnt(curve: Mapping[str, Any], stream: BytesIO, dark: bool = False) -
 
 
 def _held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels, float]]:
-    """Records that were not fitted (without any, all), the worst predicted first: each with its worst channel,
+    """Held-out records (all records if there are none), worst predicted first: each with its worst channel, the
     predictions before and after, and the floor's standard deviation of that channel."""
     trials = diagnosis.split.final or diagnosis.split.known
     before, after = (evaluate_on(fit, trials).predictions() for fit in (diagnosis.base, diagnosis.final))
@@ -148,7 +148,7 @@ def _traces_on(axes: Sequence[Any], palette: Palette, one: tuple[Any, ...], lege
 
 def _rms(samples: np.ndarray) -> float:
     known = samples[np.isfinite(samples)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else float("inf")  # not predicted at all: the worst
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("inf")  # no prediction at all ranks worst
 
 
 def _bars(side: Mapping[str, Any]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What was measured, and where the noise floor comes from, in words."""
+"""Summary of the measured records, and the origin of the noise floor in words."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from lacuna.system import by_channel
 
 
 def measured_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
-    """By experiment and channel: records, conditions, floor, and samples that count as one."""
+    """Table rows by experiment and channel: records and conditions, floor, samples per observation, and its basis."""
     rows = []
     for (experiment, channel), trials in by_channel(diagnosis.base.structure.system.trials).items():
         noise = diagnosis.search.floor.of(experiment, channel)
@@ -19,7 +19,7 @@ def measured_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
 
 
 def floor_sentence(diagnosis: Diagnosis) -> str:
-    """Where the floor comes from, and what that means where it is not from repeats."""
+    """Say where the floor comes from and, for channels without repeats, what that implies."""
     channels = diagnosis.search.floor.channels
     repeats = sum(noise.repeats for noise in channels.values())
     alone = sorted({channel for (_, channel), noise in channels.items() if not noise.repeats})
@@ -30,12 +30,12 @@ def floor_sentence(diagnosis: Diagnosis) -> str:
     if len(told) == len(alone):
         listed = ", ".join(f"{seconds:.3g} s of {channel}" for channel, seconds in told.items())
         return (
-            f"Without repeats the floor is what residuals change by within the noise's correlation time ({listed});"
-            " whatever varies as fast counts as noise here, whatever is slower as structure."
+            f"Without repeats the floor is how much residuals change within the noise's correlation time ({listed});"
+            " whatever varies that fast counts as noise here, whatever is slower as structure."
         )
     return (
         f"Without repeats the floor of {', '.join(alone)} is the fast noise of the residual: whatever varies slowly"
-        " from run to run counts as structure here, and only a repeat could show that it is none."
+        " from run to run counts as structure here, and only a repeat could show that it is not."
     )
 
 

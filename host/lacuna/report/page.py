@@ -10,7 +10,7 @@ from io import BytesIO
 import jinja2
 from markupsafe import Markup
 
-COLORS = {  # by role; what is quiet is still to be read
+COLORS = {  # by role; quiet text must still be legible
     "light": {"paper": "#ffffff", "ink": "#1d1f23", "quiet": "#5d636d", "grid": "#d9dce1"},
     "dark": {"paper": "#16181c", "ink": "#e6e6e6", "quiet": "#a2a8b2", "grid": "#33373e"},
 }
@@ -18,7 +18,7 @@ COLORS = {  # by role; what is quiet is still to be read
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawing in both palettes, each as a data URI; `alt` says in words what it shows."""
+    """A drawing in both palettes, each as a data URI; `alt` describes it in words."""
 
     light: str
     dark: str
@@ -28,9 +28,9 @@ class Figure:
 
 @dataclass(frozen=True)
 class PageTable:
-    """Rows of text under column heads; columns after the first are figures and set to the right.
+    """Rows of text under column headings. Columns after the first hold numbers and are right-aligned.
 
-    words: the last column is text, and set to the left.
+    `words`: the last column is text and left-aligned.
     """
 
     columns: Sequence[str]
@@ -42,7 +42,8 @@ class PageTable:
 
 @dataclass(frozen=True)
 class Section:
-    """One heading with its paragraphs, then what it shows. Who shows more derives from it and from the template."""
+    """A heading with paragraphs, tables, figures and links. To show more, derive from this class and from the
+    template."""
 
     title: str
     paragraphs: Sequence[str] = ()
@@ -52,16 +53,16 @@ class Section:
 
     @property
     def anchor(self) -> str:
-        """Its name in a link."""
+        """Fragment identifier of the section, for links."""
         return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
 
 
 @dataclass(frozen=True)
 class Page:
-    """The first screen, then sections, which the contents list.
+    """A page: the first screen, then the sections, which a table of contents lists.
 
-    lead: the answer in one or two sentences; words: what the words in it and in the tables mean; about: date, command
-    and the like, by name; facts: (figure, what it is) pairs.
+    `lead`: the answer in one or two sentences; `words`: paragraphs that explain the terms used; `about`: date, command
+    and the like, as (name, value) pairs; `facts`: (figure, meaning) pairs.
     """
 
     title: str
@@ -75,7 +76,7 @@ class Page:
 
 
 def both_palettes(draw: Callable[[BytesIO, bool], None], alt: str, caption: str = "") -> Figure:
-    """A figure from `draw(stream, dark)`, which writes a PNG."""
+    """Draw a figure in both palettes; `draw(stream, dark)` writes a PNG."""
 
     def data_uri(dark: bool) -> str:
         png = BytesIO()
@@ -86,12 +87,12 @@ def both_palettes(draw: Callable[[BytesIO, bool], None], alt: str, caption: str 
 
 
 def render(page: Page) -> str:
-    """The page as one HTML document; all text is escaped."""
+    """Render the page as one HTML document; all text is escaped."""
     return environment().get_template("page.html.jinja").render(page=page, palettes=COLORS, style=style())
 
 
 def environment(*more: jinja2.BaseLoader) -> jinja2.Environment:
-    """Where templates are found, `more` first; all text is escaped."""
+    """Return the template environment, which searches `more` first and escapes all text."""
     return jinja2.Environment(
         loader=jinja2.ChoiceLoader([*more, jinja2.PackageLoader("lacuna.report", "")]),
         autoescape=True,
@@ -102,5 +103,5 @@ def environment(*more: jinja2.BaseLoader) -> jinja2.Environment:
 
 
 def style() -> Markup:
-    """The rules of every page, which name colours by the roles of `COLORS`."""
+    """Return the style sheet of every page, which refers to colours by their roles in `COLORS`."""
     return Markup(files("lacuna.report").joinpath("page.css").read_text(encoding="utf-8"))

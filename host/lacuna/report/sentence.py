@@ -1,4 +1,4 @@
-"""A verdict in one sentence, wherever it is told."""
+"""A verdict in one sentence, for text and pages."""
 
 from __future__ import annotations
 
@@ -7,28 +7,29 @@ from typing import Any
 
 
 def in_words(effect: Mapping[str, Any]) -> str:
-    """The effect's name as it is, with spaces."""
+    """The effect's name, with spaces instead of underscores."""
     return effect["name"].replace("_", " ")
 
 
 def own_form(effect: Mapping[str, Any]) -> str:
-    """Where it acts in another form than the library's; empty if it does not."""
+    """Say where an effect acts in a form other than the library's; empty if it does not."""
     _, freed, where = effect["form"].partition("freed: ")
     return f"in a form of its own: {where}" if freed else ""
 
 
 def share_in_words(share: float | None) -> str:
-    """A share of the gap, the whole at most: below the floor there is but chance. None where there is no gap, or no
-    trial was left to measure it on."""
+    """Format a share of the gap, at most 100 %, since errors below the floor are chance. `share` is None if there is no
+    gap, or no trial to measure it on."""
     return "no gap was measured" if share is None else f"{100 * min(share, 1.0):.0f} % of the gap"
 
 
 def number_in_words(value: float | None, digits: str = ".4g") -> str:
+    """Format a number; a dash if it does not exist."""
     return "-" if value is None else format(value, digits)
 
 
 def next_in_words(coming: Mapping[str, Any]) -> str:
-    """What the next experiment would separate; empty where there is none."""
+    """Say which explanations the next experiment would separate; empty if no experiment is recommended."""
     if not coming["experiment"]:
         return ""
     settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
@@ -42,7 +43,8 @@ def verdict_sentence(
     words: Callable[[Mapping[str, Any]], str] = in_words,
     nearest: Sequence[Mapping[str, Any]] = (),
 ) -> str:
-    """A verdict (of `as_record`) in one sentence; `words`: what an effect is called; `nearest`: what else was tried."""
+    """State a verdict (from `as_record`) in one sentence. `words` returns the name of an effect; `nearest` lists other
+    explanations that were tried."""
     if verdict == "none":
         near = "to within the noise" if (remainder["times_floor"] or 0.0) <= 1.0 else "as well as was asked for"
         return f"Nothing that matters is missing from the base model: it predicts these data {near}."

@@ -1,4 +1,4 @@
-"""One look for every figure: grids stay quiet, light and dark."""
+"""The common style of all figures, in a light and a dark palette."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ class Palette:
 LIGHT = Palette("#222222", "#8a8a8a", "#222222", "#C2559D", "#B8B8B8", "#0072B2")
 DARK = Palette("#e6e6e6", "#8f8f8f", "#e6e6e6", "#E59CCB", "#6b6b6b", "#56B4E9")
 
-LOOK = {  # of every figure, whatever the colours
+LOOK = {  # settings that do not depend on the palette
     "font.size": 9,
     "axes.titlesize": 10,
     "axes.titleweight": "bold",
@@ -42,32 +42,22 @@ LOOK = {  # of every figure, whatever the colours
 
 
 @contextmanager
-def figure_style(dark: bool = False) -> Iterator[Palette]:
-    """Matplotlib without a display and with the project's look, inside the block only."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    with look(dark) as palette:
-        yield palette
-
-
-@contextmanager
 def drawn(
     stream: BytesIO, dark: bool, size: tuple[float, float], rows: int = 1, columns: int = 1, **how: Any
 ) -> Iterator[tuple[Any, Palette]]:
-    """The axes of a figure of so many inches, written as PNG at the end of the block; `how`: of `plt.subplots`."""
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
+    """Yield the axes of a figure of `size` inches and write it to `stream` as PNG at the end of the block, without
+    pyplot: the user's backend stays as it is. `how` is passed to `Figure.subplots`."""
+    from matplotlib.figure import Figure
 
-        figure, axes = plt.subplots(rows, columns, figsize=size, **how)
-        yield axes, palette
+    with look(dark) as palette:
+        figure = Figure(figsize=size, layout="constrained")
+        yield figure.subplots(rows, columns, **how), palette
         figure.savefig(stream, format="png")
-        plt.close(figure)
 
 
 @contextmanager
 def look(dark: bool = False) -> Iterator[Palette]:
-    """The look alone, on whatever display there is."""
+    """Apply the project's style within the block, with whatever backend is active."""
     import matplotlib
 
     palette = DARK if dark else LIGHT

@@ -1,4 +1,4 @@
-"""A verdict as a screen of text."""
+"""A verdict as one screen of text."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _WARNINGS, _TRIED = 6, 4
 
 
 def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str:
-    """At most `_LINES` lines of at most `_WIDTH` characters."""
+    """Return the verdict as at most `_LINES` lines of at most `_WIDTH` characters."""
     sentence = verdict_sentence(record["verdict"], record["effects"], record["remainder"], nearest=record["nearest"])
     lines = [f"{name}: {record['verdict']}", *_wrapped(sentence), ""]
     lines += _effects(record)
@@ -32,7 +32,8 @@ def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str
 
 
 def _where(record: Mapping[str, Any]) -> Iterator[str]:
-    """Where what is missing shows: of an explanation what it leaves, and first where that was if no error showed it."""
+    """Say where the residual lies: that of the base model or, for a verdict `identified`, what the effects leave,
+    preceded by the former if there was no gap."""
     lacking = record["signature"]["text"]
     if record["verdict"] != "identified":
         yield lacking
@@ -75,7 +76,7 @@ def _errors(error: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _more(record: Mapping[str, Any], effects: Sequence[str]) -> Iterator[str]:
-    """What else the completed model has (`effects`, and what was learnt), what was tried, and what to do next."""
+    """Say what else the completed model contains (`effects`, learnt curves), what was tried, and what to do next."""
     if record["verdict"] == "unexplained" and effects:
         yield f"In the errors after and in the completed model, though not named: {', '.join(effects)}."
     if curves := record["learnt"]:

@@ -1,4 +1,4 @@
-"""The report of a blind trial, and the records that it is printed from."""
+"""The report of a blind trial and the records it is printed from."""
 
 import json
 from unittest.mock import Mock
@@ -9,7 +9,7 @@ from benchmarks import blind, blind_figures, records
 
 
 def record(seed: int, *named: str, kind: str = "single", truth: str = "leak", matters: bool = False) -> dict:
-    """Of a data set with a leak of 0.05 /s, as `diagnose_sealed` keeps it."""
+    """A record as `diagnose_sealed` writes it, for a data set with a leak of 0.05 /s."""
     effect = {"interval_90": {"rate_per_s": [0.0412345678, 0.06]}, "confusable_with": [], "probability": 0.99}
     error = {"fitted": 1.0, "held_out": 1.0, "held_out_conditions": 1.0, "by_experiment": {"step_response": 1.0}}
     return {

@@ -1,4 +1,4 @@
-"""Gaits at the cliff, and whether the probability of walking there is honest."""
+"""Gaits near the cliff, and the calibration of their predicted probability of walking."""
 
 from dataclasses import replace
 
@@ -14,9 +14,9 @@ def test_gaits_are_found_with_which_nearly_all_to_few_of_the_robots_walk():
     robust = library.load("robust").gait
     found = cliff.at_the_cliff(nominal(), replace(robust, period_s=1.05 * robust.period_s))
     probabilities = [prediction.walks_probability for _, prediction in found]
-    assert probabilities == pytest.approx(cliff.WANTED, abs=0.06)  # it is a staircase
+    assert probabilities == pytest.approx(cliff.WANTED, abs=0.06)  # a step function: the robots are finitely many
     assert sorted(faster for faster, _ in found) == [faster for faster, _ in found]
-    assert cliff.at_the_cliff(nominal(), BASELINE) == [], "which has none"
+    assert cliff.at_the_cliff(nominal(), BASELINE) == [], "the baseline gait has no cliff"
 
 
 def test_what_was_predicted_is_compared_with_what_walked(capsys):

@@ -1,4 +1,4 @@
-"""The pictures of docs/concepts.md are what its command draws, each from a run that shows what the page says."""
+"""The command of docs/concepts.md draws all its pictures, each from a run that shows what the page claims."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Whether what a demo's seal held was named, from the summaries of campaigns."""
+"""Whether a demo's diagnosis named the sealed effect, evaluated from campaign summaries."""
 
 import json
 from unittest.mock import Mock

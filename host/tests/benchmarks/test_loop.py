@@ -1,4 +1,4 @@
-"""What the loop buys: its table, its coverage and its records."""
+"""The benefit of the closed loop: table, coverage and records of the benchmark."""
 
 from unittest.mock import Mock
 

@@ -1,4 +1,4 @@
-"""How far searches end from the best that is known: the table, and peers on the same budget."""
+"""Regret of gait searches against the best known gait: the table, and peer optimizers on the same budget."""
 
 from unittest.mock import Mock
 

@@ -1,4 +1,4 @@
-"""What a search tried is kept, and rules of decision are tried on it."""
+"""A search keeps every explanation it tried, and alternative decision rules can be replayed on it."""
 
 import json
 from multiprocessing import get_context
@@ -21,7 +21,7 @@ def tried(*effects: str, losses: list[float], cost: float | None = None) -> dict
 
 
 def search(*explanations: dict, weights=(), chosen=()) -> dict:
-    """Four trials of four conditions, of which the last three judge."""
+    """A search over four trials of four conditions; the last three are held out for selection."""
     return {
         "trials": ["a", "b", "c", "d"],
         "conditions": ["1", "2", "3", "4"],
@@ -113,7 +113,7 @@ def test_a_probability_is_that_of_every_explanation_that_holds_the_effect():
 
 @pytest.fixture(scope="module")
 def diagnosed():
-    """A line that hides a square, three times at each of three slopes."""
+    """Diagnosis of a linear model whose data contain a quadratic term: three runs at each of three slopes."""
     draw, simulations = np.random.default_rng(0), SimulationCount()
     u = np.linspace(-1.0, 1.0, 60)
 

@@ -1,4 +1,4 @@
-"""What verdicts owe to the rules: the table, and that a rule that decides something is seen to."""
+"""Sensitivity of verdicts to the decision rules: the table, and that a decisive rule shows in it."""
 
 from benchmarks.sensitivity import names_under, table, variants
 from benchmarks.small.draw import drawn
@@ -11,8 +11,8 @@ def test_every_rule_of_decision_is_halved_and_doubled():
     policies = variants()
     assert policies["gain", 0.5].gain == POLICY.gain / 2
     assert policies["gain", 2.0].share == POLICY.share
-    assert policies["supported", 2.0].supported == 0.99  # a weight stays one
-    assert ("promising", 2.0) not in policies  # the search's
+    assert policies["supported", 2.0].supported == 0.99  # a probability stays below 1
+    assert ("promising", 2.0) not in policies  # a setting of the search, not a rule of decision
 
 
 def test_a_share_of_the_gap_that_no_effect_reaches_takes_its_name_away():

@@ -1,4 +1,4 @@
-"""What is promised of a walk's accuracy: of settled cycles with any step, in a transient with the fine one."""
+"""The promised accuracy of a walk: with any step in settled cycles, with the fine step in a transient."""
 
 import pytest
 
@@ -16,7 +16,7 @@ def test_settled_cycles_are_accurate_with_any_step(tolerance_m, within):
 
 
 def test_in_a_transient_near_the_fastest_gait_only_the_fine_step_is():
-    """The fourth cycle of the second gait: errors of a coarse step grow there before they die out."""
+    """In the fourth cycle of the second gait, errors of the coarse step grow before they decay."""
     assert reference_error(nominal(), ROWS, CYCLES, SEARCHING_M) > 5e-3
     assert reference_error(nominal(), ROWS, CYCLES, FINE_M) < 2e-3
 

@@ -1,4 +1,4 @@
-"""Small systems: truths are of other formulas, sealed, the same for a seed, and can be told."""
+"""Small systems: truths use formulas of their own, are sealed, reproducible from a seed, and distinguishable."""
 
 import json
 import pickle
@@ -217,13 +217,13 @@ def test_rates_count_each_miss_once():
 
 
 def of_none(seed):
-    """What the engine says of a set without an effect."""
+    """The engine's record of a data set without an effect."""
     return record("none", []) | {"seed": seed, "processor_seconds": 1.0, "simulations": 9, "version": "v", "off": 1.0}
 
 
 @pytest.fixture
 def sets_of_none(tmp_path, monkeypatch):
-    """Runs the trial of so many sets without an effect; where its records are."""
+    """A function that runs the trial on a number of data sets without an effect, and the path of its records."""
     path = tmp_path / "small.jsonl"
     given = ["--records", str(path), "--singles", "0", "--withheld", "0", "--pairs", "0", "--decoys", "0", "--none"]
     monkeypatch.setattr(small_systems, "compiled", lambda: None)

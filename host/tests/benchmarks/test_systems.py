@@ -1,4 +1,4 @@
-"""The comparison with what people use instead: each rival is sound, and none is judged by what it was given."""
+"""The comparison with common alternatives: each rival works correctly, and all are judged on held-out records."""
 
 from dataclasses import replace
 from types import ModuleType
@@ -25,7 +25,7 @@ EFFECTS = (
 
 
 def static(hidden, noise=0.0, seed=0):
-    """y = gain u, and what `hidden` adds: so simple that every fit is exact."""
+    """The problem y = gain u plus the terms in `hidden`: so simple that every fit is exact."""
 
     def simulate(record, theta):
         u = record["u"]
@@ -66,7 +66,7 @@ def test_bic_is_the_textbooks():
 
 
 def test_fits_keep_to_the_bounds():
-    """A cube that would have to be negative stays at nothing."""
+    """A cubic term that fits best with a negative size, outside its bounds, stays at 0."""
     problem = static({})
     negated = (replace(r, channels={"y": 2.0 * r["u"] - 0.7 * r["u"] ** 3}) for r in problem.fitted)
     assert best_subset.fit(replace(problem, fitted=tuple(negated)), ["cube"])["cube.size"] >= 0.0
@@ -81,7 +81,7 @@ def test_an_effect_that_is_off_stands_where_it_is_absent():
 def test_sparse_regression_recovers_terms_and_parameters_where_there_is_no_noise():
     quiet = spring.problem(hidden={"cubic_spring.stiffness_N_m3": 4000.0})
     still = {**spring.BASE, "cubic_spring.stiffness_N_m3": 4000.0}
-    sweeps = [r for r in quiet.fitted if r.experiment == "sweep"]  # a filter blurs what a step does
+    sweeps = [r for r in quiet.fitted if r.experiment == "sweep"]  # a derivative filter blurs the response to a step
     clean = tuple(replace(r, channels={"position_mm": quiet.predict(r, still)}) for r in sweeps)
     quiet = replace(quiet, fitted=clean, held_out=clean)
     answer = sparse_regression.solve(quiet)
@@ -160,7 +160,7 @@ def test_the_coarser_integrator_of_the_hysteresis_errs_far_less_than_the_noise()
 
 
 def test_what_the_pump_gives_is_in_the_tanks():
-    """With the lower outlet shut and no brim: the sum of both levels is what was pumped, sample by sample."""
+    """With the lower outlet shut and no brim, both levels sum to the pumped volume at every sample."""
     pump_V = tanks.problem().fitted[0]["pump_V"]
     shut = (0.05, 0.0, 0.04, np.inf, 0.0, 0.0, 0.0, np.inf, 0.0, 0.0, 0.0)
     lower = tanks.levels(pump_V, np.zeros((len(pump_V), 2)), *shut)
@@ -185,6 +185,6 @@ def test_without_the_measured_records_it_says_so(monkeypatch, tmp_path, capsys):
 
 
 def test_an_effect_dropped_from_a_pair_leaves_the_other_as_it_was_in_company():
-    """Alone, the overflow stops at a brim that nothing reaches; beside a leak of 0 it was found."""
+    """Fitted alone, the overflow stops at a brim that the level never reaches; beside a leak of 0 it is found."""
     answer = engine.solve(tanks.problem())
     assert answer.named == ("overflow",)

@@ -1,4 +1,4 @@
-"""A bench for campaigns by hand: the real image behind a pty, a second process as camera and testing machine."""
+"""A bench for campaigns by hand: the real firmware behind a pty, and a second process as camera and testing machine."""
 
 import subprocess
 import sys
@@ -11,8 +11,8 @@ HOST = Path(__file__).parents[2]
 
 @pytest.fixture
 def lab(tmp_path, request):
-    """(pty, watched folder) of a bench served by another process; where the test asks for it, its instruments write as
-    the named programs do, one after the other."""
+    """(pty, watched folder) of a bench served by another process. With the parameter "programs", its instruments write
+    files like those of each supported program in turn."""
     link, files = tmp_path / "uno", tmp_path / "files"
     files.mkdir()
     bench = [str(tmp_path / "bench.toml")] if getattr(request, "param", None) == "programs" else []

@@ -1,4 +1,4 @@
-"""Walks fed back until a gait that was never fitted is predicted; the robot here is a model with noise."""
+"""Feeding walks back until the speed of a gait never fitted is predicted; here the robot is a model with noise."""
 
 import json
 from dataclasses import replace
@@ -22,7 +22,7 @@ from bifa.simulate import walk
 
 ROBOT = nominal()
 SLIPPERY = ROBOT.with_values({"mu_k": 0.6 * ROBOT.values["mu_k"], "mu_s": 0.6 * ROBOT.values["mu_s"]})
-BRISK = ROBOT.with_values({"body_alpha_n_per_s": 1.2 * ROBOT["body_alpha_n_per_s"]})  # misses FASTER by 2 %
+BRISK = ROBOT.with_values({"body_alpha_n_per_s": 1.2 * ROBOT["body_alpha_n_per_s"]})  # predicts FASTER 2 % wrong
 FAST = Gait(2.72, 204.5, 331.7, 0.6535, 0.439, 0.439)
 FASTER = Gait(2.6, 204.5, 331.7, 0.6535, 0.439, 0.439)
 
@@ -43,13 +43,13 @@ def walked(gaits: dict[str, Gait], seed: int = 0, robot: Model = ROBOT, cycles: 
 
 
 def test_a_walk_that_never_settles_is_predicted_for_as_many_cycles_as_it_has():
-    """A tether that grows: 22.4 mm/s of 16 cycles were predicted where walks of 24 are told by their second half."""
+    """With a growing tether, 22.4 mm/s were predicted for 16 cycles, but walks of 24 count by their second half."""
     tethered = ROBOT.with_effects({"tether_drag": {"drag_N_m": 4.0}})
     speeds = []
     for cycles in (8, 24):
         dataset = walked({"fast": FAST}, robot=tethered, cycles=cycles)
         one = judged(tethered, ("tether_drag",), dataset)
-        assert one.inside, "of 16 cycles 19.6 mm/s and more are predicted"
+        assert one.inside, "for 16 cycles 19.6 mm/s and more are predicted"
         speeds.append(one.measured_mm_s)
     assert speeds[1] < 0.9 * speeds[0]
 
@@ -66,7 +66,7 @@ def folders(tmp_path):
 
 
 def stood(gaits: dict[str, Gait], seed: int) -> Dataset:
-    """A robot that does not walk."""
+    """Walks of a robot that moves back and forth without advancing."""
     still = []
     for trial in walked(gaits, seed).trials:
         place_mm = 5.0 * np.sin(2 * np.pi * trial.time_s / trial.gait["period_s"])
@@ -83,7 +83,7 @@ fall = partial(walk_into, walks=stood)
 
 
 def rounds_of(folders, first, trades, effects=()):
-    """The rounds that again() writes with a completed model `first`."""
+    """The rounds that again() writes, starting from the completed model `first`."""
     inputs, outputs = folders
     save_model(inputs / "model-completed.toml", first)
     again(inputs, outputs, Dataset(None, "day", {}, ()), effects, trades)
@@ -91,20 +91,20 @@ def rounds_of(folders, first, trades, effects=()):
 
 
 def go_round(folders, first, later):
-    """The rounds with diagnoses that answer `later` in turn, and the data that they saw; each ends at FASTER."""
+    """The rounds if the diagnoses return the models `later` in turn, and the data that they saw; each finds FASTER."""
     complete, search = Mock(side_effect=[(model, ("hysteresis",)) for model in later]), Mock(return_value=FASTER)
     rounds = rounds_of(folders, first, Trades(complete, search, walk_into))
     begun = [walked for (_, walked), _ in search.call_args_list]
-    assert begun == [(FASTER, FAST, *[FASTER] * number) for number in range(len(later))], "from all that were walked"
+    assert begun == [(FASTER, FAST, *[FASTER] * number) for number in range(len(later))], "from all gaits walked"
     seen, asked = zip(*(call.args for call in complete.call_args_list), strict=True)
-    assert asked == ((), *[("hysteresis",)] * (len(later) - 1)), "what was named before is tried again"
+    assert asked == ((), *[("hysteresis",)] * (len(later) - 1)), "effects named before are suspected again"
     return rounds, [[trial.file for trial in dataset.trials] for dataset in seen]
 
 
 def test_a_robust_gait_that_is_predicted_is_followed_by_the_one_at_the_edge(folders):
     rounds, seen = go_round(folders, ROBOT, [ROBOT])
     assert [(Gait(**r["gait"]), r["at_edge"]) for r in rounds] == [(FAST, False), (FASTER, True)]
-    assert [len(files) for files in seen] == [6], "its walks, and the base model's, narrow what is known"
+    assert [len(files) for files in seen] == [6], "its walks and the base model's are added to the data"
     assert [r["ended"] for r in rounds] == [None, "predicted"]
     for one in rounds:
         low, high = one["interval_90_mm_s"]
@@ -121,7 +121,7 @@ def test_a_gait_that_is_not_is_fed_back_and_the_next_one_judged(folders):
     rounds, (seen,) = go_round(folders, SLIPPERY, [ROBOT])
     assert [r["error_mm"] < 1.1 * r["floor_mm"] for r in rounds] == [False, True]
     assert sorted(seen) == [f"walks-1/{name}_{n}.csv" for name in ("base", "completed") for n in (1, 2, 3)], (
-        "its walks and the base model's; the bench has walked the baseline for another length of time"
+        "its walks and the base model's, but not the baseline's, whose length differs from those of the bench"
     )
     walks = read_dataset(folders[1] / "rounds" / "walks-2")
     assert {Gait(**trial.gait) for trial in walks.trials} == {FASTER}
@@ -136,7 +136,7 @@ def test_it_ends_where_nothing_changes_any_more(folders):
 
 
 def test_a_model_that_names_something_is_not_given_up_for_one_that_names_nothing(folders):
-    """Choked flow, 800: with the walks among the data nothing was named, and the edge was sought of the base model."""
+    """Robot choked_flow, 800: with the walks added nothing was named, and the edge was sought for the base model."""
     search = Mock(return_value=FASTER)
     trades = Trades(lambda dataset, suspected: (SLIPPERY, ()), search, walk_into)
     rounds = rounds_of(folders, ROBOT, trades, ("hysteresis",))
@@ -146,19 +146,19 @@ def test_a_model_that_names_something_is_not_given_up_for_one_that_names_nothing
 
 
 def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
-    """The robot stands still with the gait at the edge: two cycles of it are recorded, fed back, and the next tried."""
+    """If the robot stands still with the gait at the edge, two cycles are fed back and the next gait is tried."""
     complete = Mock(return_value=(ROBOT, ()))
     rounds = rounds_of(folders, ROBOT, Trades(complete, lambda model, walked: FASTER, fall))
     seen = [sorted({trial.file.split("/")[0] for trial in call.args[0].trials}) for call in complete.call_args_list]
     assert len(rounds) == ROUNDS
     assert seen == [["walks-1"], ["walks-1", "walks-2"]]
     assert all(abs(r["measured_mm_s"]) < 1.0 and not r["inside"] for r in rounds[1:])
-    assert load_gait(folders[1] / "gait-last.toml") == FAST, "the robust gait is what is kept"
+    assert load_gait(folders[1] / "gait-last.toml") == FAST, "the robust gait is kept"
 
 
 def test_a_gait_that_its_own_model_expects_to_fall_is_not_walked(folders):
-    """Choked flow, 906: a third diagnosis took a miss of 0.8 % for a tether, and walked what it gave a probability of
-    0.16; 20.3 mm/s became 6.4."""
+    """Robot choked_flow, 906: a third diagnosis took an error of 0.8 % for a tether, and a gait with a probability of
+    walking of 0.16 was walked; 20.3 mm/s became 6.4."""
     complete = Mock(side_effect=[(robot, ("hysteresis",)) for robot in (ROBOT, SLIPPERY)])
     rounds = rounds_of(folders, SLIPPERY, Trades(complete, Mock(side_effect=[FASTER, None]), fall))
     assert [(tuple(r["effects"]), r["ended"]) for r in rounds] == [((), None), (("hysteresis",), "falls")]
@@ -177,7 +177,7 @@ def test_rounds_that_an_interrupted_run_has_walked_are_neither_sought_nor_walked
 
 @pytest.mark.parametrize(("probability", "gait"), [(0.97, FASTER), (0.16, None), (None, None)])
 def test_at_the_edge_there_may_be_no_gait(monkeypatch, probability, gait):
-    """None walks, or the best of them probably would not."""
+    """There is no gait at the edge if none walks, or if the best one probably would not."""
     found = SimpleNamespace(gait=FASTER, prediction=SimpleNamespace(walks_probability=probability))
     nothing = SearchError("none of 40 gaits walks")
     monkeypatch.setattr("bifa.campaign.loop.found_gait", Mock(side_effect=[found if probability else nothing]))

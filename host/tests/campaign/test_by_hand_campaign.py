@@ -1,4 +1,4 @@
-"""`bifa campaign --port` at a bench: the real image behind a pty, a second process as camera and testing machine."""
+"""`bifa campaign --port` at a bench: the real firmware behind a pty, a second process as camera and testing machine."""
 
 import os
 import signal
@@ -37,7 +37,7 @@ def wait_for(process, *words):
         said.append(line)
         if all(word in "".join(said) for word in words):
             return "".join(said)
-    raise AssertionError(f"never said {words}: {''.join(said)}")
+    raise AssertionError(f"never printed {words}: {''.join(said)}")
 
 
 def interrupt(process) -> str:
@@ -77,14 +77,14 @@ def test_an_experiment_records_a_walk_with_the_camera(lab, tmp_path):
 
 @pytest.mark.parametrize("lab", ["programs"], indirect=True)
 def test_an_experiment_takes_the_exports_of_testing_machines_by_preset(lab, tmp_path):
-    """Two of them: the declaration is put right while the second record waits."""
+    """Two machines' exports are read; the declaration is corrected while the second record waits."""
     (tmp_path / "bench.toml").write_text("[known]\n")
     options = ("--actuator", "small", "--pressure", "0", "--rate", "40", "--repeats", "2", "--out", "static")
     output, _ = begin(lab, tmp_path, "experiment", *options, "static_loading").communicate(timeout=120)
     assert output.count("Nothing looks wrong") == 2, output
     trials = read_dataset(tmp_path / "static").trials
     kept = [list((tmp_path / "static" / "raw").glob(f"{Path(trial.file).stem}*")) for trial in trials]
-    assert [len(files) for files in kept] == [2, 2], "the instrument's own files of each trial, as they came"
+    assert [len(files) for files in kept] == [2, 2], "the instrument's original files of each trial"
     assert all(trial.columns["displacement_mm"].max() > 25.0 for trial in trials)
     assert all(trial.extra["clock_error_s"] < 1e-3 for trial in trials)
 
@@ -92,7 +92,7 @@ def test_an_experiment_takes_the_exports_of_testing_machines_by_preset(lab, tmp_
 @pytest.mark.soak
 @pytest.mark.parametrize("lab", ["programs"], indirect=True)
 def test_a_campaign_takes_the_exports_of_every_named_program_by_preset(lab, tmp_path):
-    """One after the other, fifteen conditions: eight testing machines, six cameras."""
+    """Fifteen conditions cover eight testing machines and six cameras in turn."""
     (tmp_path / "bench.toml").write_text("[known]\n")
     options = ("--quick", "--out", "run", "--bench", "bench.toml")
     process = begin(lab, tmp_path, "campaign", *options)

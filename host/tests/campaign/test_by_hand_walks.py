@@ -1,6 +1,6 @@
-"""The stages that walk, on a serial port with the camera's files: the image behind a pty, a second process as the lab.
+"""The walking stages, on a serial port with the camera's files: firmware behind a pty, a second process as the lab.
 
-What computes between them is given: the gaits, and a diagnosis that errs at first.
+The computing stages between them are stubs: given gaits, and a diagnosis that errs at first.
 """
 
 import json
@@ -33,7 +33,7 @@ EFFORT = Effort(quick=True, cycles=4, repeats=1)
 
 @pytest.fixture
 def folder(tmp_path):
-    """What the stages before and between the walks leave: the day's data, models and gaits."""
+    """The output of the stages before and between the walks: the day's data, models and gaits."""
     folder = tmp_path / "run"
     (folder / "separating").mkdir(parents=True)
     columns = walk(ROBOT, BASELINE, time_s=np.arange(0.0, 6.0, 0.01)).columns
@@ -48,7 +48,7 @@ def folder(tmp_path):
 
 
 def walks(lab, folder, said, stop_at=None):
-    """Run the stages that walk; Ctrl-C as soon as `stop_at` is said."""
+    """Run the walking stages; Ctrl-C as soon as `stop_at` is printed."""
     link, files = lab
 
     def say(text: str) -> None:

@@ -1,4 +1,4 @@
-"""The whole loop on a robot with an undeclared effect: real firmware, real link, verdict before the label."""
+"""The whole loop on a robot with an undeclared effect: real firmware and link, verdict before the label is read."""
 
 import json
 import subprocess
@@ -29,10 +29,10 @@ def test_the_demo_names_the_sealed_effect_and_predicts_what_is_then_measured(tmp
     assert list(speeds) == ["baseline", "base", "completed", "edge"]
     for one in speeds.values():
         assert one["completed_model"] == pytest.approx(one["measured"], rel=0.03)
-    for name in ("baseline", "completed", "edge"):  # each with an interval by a model that knows the robot
+    for name in ("baseline", "completed", "edge"):  # each with an interval from a model that describes the robot
         low, high = speeds[name]["interval_90_mm_s"]
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        # one speed in ten lies outside of it, and hardly one in a million beyond three times as far
+        # one speed in ten lies outside it, and hardly one in a million beyond three times its half-width
         assert abs(speeds[name]["measured"] - middle) < 3.0 * half
         assert speeds[name]["walks_probability"] > 0.9
     assert speeds["completed"]["measured"] > 1.5 * speeds["baseline"]["measured"]

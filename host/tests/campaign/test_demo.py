@@ -1,4 +1,4 @@
-"""The short demonstration: the real image walks; killed at any moment it leaves nothing half-written."""
+"""The short demonstration: the real firmware walks; killed at any moment, it leaves nothing half-written."""
 
 import os
 import signal

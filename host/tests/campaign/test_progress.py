@@ -1,4 +1,4 @@
-"""How a campaign is getting on fits terminals of any width, whole."""
+"""A campaign's progress fits terminals of any width without being cut off."""
 
 import io
 import re

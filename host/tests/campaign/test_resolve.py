@@ -1,4 +1,4 @@
-"""What a diagnosis could not tell apart is measured and diagnosed again, on the real firmware."""
+"""Effects that a diagnosis could not tell apart are measured and diagnosed again, on the real firmware."""
 
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -53,14 +53,14 @@ def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
     assert found.next.experiment is None
     diagnose.assert_called_once_with(
         dataset, {"leak", "hysteresis", "viscoelasticity"}
-    )  # what was named is tried again
+    )  # named effects are suspected again
     assert [t.actuator for t in dataset.trials] == ["small"] * 3
     assert dataset.trials[0].columns["displacement_mm"].max() > 25.0
 
 
 @pytest.fixture
 def diagnosing(monkeypatch, tmp_path):
-    """`bifa diagnose` of an empty day, and what it comes to: what was diagnosed, and what reported."""
+    """Run `bifa diagnose` on an empty day: its exception, and a list of what was diagnosed and reported."""
     done = []
     monkeypatch.setattr("bifa.data.read_dataset", lambda folder: DAY)
     monkeypatch.setattr("bifa.identify.start.prepare", lambda *_: SimpleNamespace())

@@ -1,4 +1,4 @@
-"""A campaign at a bench of one's own: what is known is asked once, and only measuring needs the robot."""
+"""A campaign at one's own bench: known values are asked for once, and only measuring needs the robot."""
 
 from dataclasses import replace
 from unittest.mock import Mock
@@ -21,7 +21,7 @@ from bifa.robot.gait import BASELINE, load_gait, save_gait
 
 
 def answering(*lines):
-    """A desk with somebody who says these lines."""
+    """A desk where somebody answers with these lines."""
     return Mock(**{"answer.side_effect": lines})
 
 
@@ -48,7 +48,7 @@ def test_a_bench_that_has_only_declared_its_instruments_is_asked_and_keeps_them(
     [
         ("[known]\nhead_mass_kg = 50.0\n", "outside its range"),
         ("[known]\nweight = 1.0\n", "no parameter 'weight'"),
-        ("head_mass_kg = 0.2\n", r"has the tables \[known\]"),
+        ("head_mass_kg = 0.2\n", r"may have the tables \[known\]"),
         ("[known\n", "cannot read"),
     ],
 )
@@ -73,7 +73,7 @@ def test_a_corrected_mass_is_declared_anew_without_the_robot(tmp_path):
 
 @pytest.fixture
 def own_driver(monkeypatch):
-    """A rig of one's own, by its name; what it records is written by `recording`."""
+    """The name of a user's own rig; its records are written by `recording`."""
     monkeypatch.setattr(bifa.campaign.setup, "is_offered", lambda port: port in ("virtual", "my-lab"))
     return "my-lab"
 
@@ -121,7 +121,7 @@ def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path)
 
 @pytest.mark.parametrize("model", ["base", "completed"])
 def test_a_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch, model):
-    """What the base model lacks is what the campaign is for, and a robot that does not walk has a diagnosis, too."""
+    """The base model is expected to lack something, and a robot that does not walk can be diagnosed too."""
     monkeypatch.setattr(loop, "found_gait", Mock(side_effect=SearchError("none walks")))
     stages = {stage.name: stage for stage in stages_of("virtual")}
     save_model(tmp_path / f"model-{model}.toml", nominal())

@@ -1,4 +1,4 @@
-"""Campaigns side by side: what differs between them is seen, and a folder that is none is refused."""
+"""Campaigns side by side: their differences are shown, and a folder that is not a campaign's is refused."""
 
 import re
 

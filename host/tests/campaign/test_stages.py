@@ -1,4 +1,4 @@
-"""A campaign's stages: made once, resumed, rerun alone, never half-written."""
+"""A campaign's stages: run once, resumed, rerun alone, never half-written."""
 
 import hashlib
 import json
@@ -23,7 +23,7 @@ def copier(name, needs, makes, log, text="x", settings=None):
 
 
 def writing(files, raises=None, **options):
-    """A stage "measure" that writes these files, name and text, and then raises what it is told to."""
+    """A stage "measure" that writes `files`, as {name: text}, and then raises `raises`."""
 
     def run(inputs, outputs):
         for name, text in files.items():
@@ -46,7 +46,7 @@ def test_a_stage_runs_once_and_again_only_when_asked_or_something_changed(tmp_pa
     run_stages(tmp_path, stages)
     assert log == ["a", "b"]
     run_stages(tmp_path, stages, rerun=["a"])
-    assert log == ["a", "b", "a"], "what it makes is what it was: the rest does not follow"
+    assert log == ["a", "b", "a"], "its output is unchanged: later stages do not run again"
     (tmp_path / "a.txt").write_text("edited")
     run_stages(tmp_path, stages)
     assert log == ["a", "b", "a", "a"]
@@ -162,7 +162,7 @@ def test_an_interruption_while_artefacts_are_moved_locks_nobody_out(tmp_path, mo
     if moved < 2:
         with pytest.raises(KeyboardInterrupt):
             run_stages(tmp_path, [stage])
-    else:  # all moved, but the scratch not yet removed
+    else:  # all are moved, but the scratch folder is not yet removed
         with monkeypatch.context() as patch:
             patch.setattr(stages.shutil, "rmtree", lambda *_, **__: None)
             run_stages(tmp_path, [stage])
@@ -177,7 +177,7 @@ def test_an_interruption_while_artefacts_are_moved_locks_nobody_out(tmp_path, mo
 
 
 def stopping(log, settings, **options):
-    """A stage that is interrupted the first time, and says what it found in its scratch the next."""
+    """A stage that logs what it finds in its scratch folder, and is interrupted the first time."""
 
     def run(inputs, outputs):
         log.append(sorted(path.name for path in outputs.glob("trial_*")))
@@ -213,7 +213,7 @@ def test_what_somebody_has_begun_to_measure_is_neither_mixed_nor_lost(tmp_path, 
 
 
 def test_settings_that_differ_are_refused_with_what_would_be_lost_and_what_would_not(tmp_path):
-    """Nobody is told to delete trials of hours."""
+    """The refusal never advises deleting trials that took hours."""
     files = {"measured.partial/step_1.csv": "time_s\n0\n", "measured.partial/step_2.csv": "time_s\n0\n"}
     begun = replace(writing(files, KeyboardInterrupt, resumes=True, by_hand=True), makes=("measured",))
     with pytest.raises(KeyboardInterrupt):
@@ -245,7 +245,7 @@ def test_what_was_kept_before_is_never_replaced_though_some_of_it_is_gone(tmp_pa
 
 
 def measured(text="1,2\n"):
-    """A stage that measures a data set of one trial, with the instrument's own record of it."""
+    """A stage that measures a data set of one trial, with the instrument's raw record of it."""
     table = 'format = 1\n[[trial]]\nfile = "one.csv"\n'
     files = {"data/dataset.toml": table, "data/one.csv": text, "data/raw/one.csv": "as it came"}
     return writing(files, by_hand=True)
@@ -280,7 +280,7 @@ def test_where_what_was_measured_differs_or_is_gone_the_robot_does_not_move_unas
 
 
 def test_what_an_earlier_version_recorded_of_a_data_set_still_holds(tmp_path):
-    """Its digest was over all files of the folder."""
+    """The digest of an earlier version was over all files of the folder, and is still the same."""
     run_stages(tmp_path, [measured()])
     total = hashlib.sha256()
     for name in ("dataset.toml", "one.csv", "raw/one.csv"):

@@ -5,13 +5,13 @@ from .days import drawn
 
 @pytest.fixture(scope="package")
 def day(tmp_path_factory):
-    """A sound day, with an effect in it that moves everything: friction unlike each way, walks that slide."""
+    """A faultless day of a robot on an incline: an effect that changes friction by direction and makes walks slide."""
     return drawn(tmp_path_factory.mktemp("days"), 3, effect="inclination")
 
 
 @pytest.fixture(scope="package")
 def foreign_day(tmp_path_factory):
-    """A sound day of a robot that shares no formula with the model."""
+    """A faultless day of a robot that shares no formula with the model."""
     return drawn(tmp_path_factory.mktemp("days"), 4, "foreign", "hysteresis")
 
 

@@ -1,4 +1,4 @@
-"""Days in the lab from robots that are drawn, and the mistakes that are made with their data."""
+"""Days in the lab with randomly drawn robots, and typical mistakes in their data."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,7 +15,7 @@ Change = Callable[[Trial], Trial]
 
 
 def drawn(folder: Path, seed: int, truth: str = "own", effect: str | None = None, size: float = 1.5) -> Dataset:
-    """A sealed day with `effect` at so many times its modest size; without one, none."""
+    """A sealed data set with `effect` at `size` times its modest size, or without an effect."""
     out = folder / f"{truth}_{effect}_{seed}"
     if truth == "foreign":
         kind, form = ("one" if effect else "none"), None
@@ -31,7 +31,7 @@ def mistaken(day: Dataset, file: str, change: Change) -> Dataset:
 
 
 def said(day: Dataset) -> list[tuple[str, str | None]]:
-    """Kind and file of all that is found in it."""
+    """Kind and file of every finding in the data set."""
     return [(found.kind, found.file) for found in check_plausibility(day)]
 
 
@@ -40,25 +40,25 @@ def with_columns(trial: Trial, **columns: np.ndarray) -> Trial:
 
 
 def turned(*names: str) -> Change:
-    """The sign of these columns turned, of those that the trial has."""
+    """Reverse the sign of these columns, as far as the trial has them."""
     return lambda trial: with_columns(trial, **{n: -trial.columns[n] for n in names if n in trial.columns})
 
 
 def exchanged(one: str, other: str) -> Change:
-    """The names of two columns exchanged."""
+    """Exchange the names of two columns."""
     return lambda trial: with_columns(trial, **{one: trial.columns[other], other: trial.columns[one]})
 
 
 def inverted(trial: Trial) -> Trial:
-    """0 written for positive, 1 for vacuum."""
+    """Write 0 for positive pressure and 1 for vacuum."""
     return with_columns(trial, **{n: 1 - v for n, v in trial.columns.items() if n.startswith("command")})
 
 
 def head_only(trial: Trial) -> Trial:
-    """Of a walk the tail was not tracked."""
+    """The walk without the tail's displacement, as if only the head had been tracked."""
     return replace(trial, columns={n: v for n, v in trial.columns.items() if n != "displacement_tail_mm"})
 
 
 def told(**gait: float) -> Change:
-    """Another gait in dataset.toml."""
+    """Declare another gait in dataset.toml."""
     return lambda trial: replace(trial, gait=trial.gait | gait)

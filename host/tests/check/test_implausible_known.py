@@ -1,4 +1,4 @@
-"""What a lab says it knows: units, signs and names; and another robot's values are its own."""
+"""Wrong units, signs and names in a lab's known parameters are found; the values of a different robot are accepted."""
 
 import pytest
 
@@ -20,11 +20,11 @@ KNOWN = {"head_mass_kg": 0.182, "tail_mass_kg": 0.17, "supply_positive_psi": 8.4
         ({"wall_stiffness_N_m": 8.0}, "in N/mm; write 8000"),
         ({"supply_positive_psi": 58.6}, "in kPa; write 8.499"),
         ({"supply_positive_psi": 0.586}, "in bar; write 8.499"),
-        ({"supply_positive_psi": 23.2}, "absolute pressure, gauge pressure is expected; write 8.504"),
+        ({"supply_positive_psi": 23.2}, "absolute pressure, but gauge is expected; write 8.504"),
         ({"supply_negative_psi": 13.0}, "its sign is reversed; write -13"),
         ({"supply_negative_psi": 10.0}, "its sign is reversed; write -10"),
         ({"supply_negative_psi": -26.5}, "in inHg; write -13.02"),
-        ({"supply_negative_psi": 1.7}, "absolute pressure, gauge pressure is expected; write -13"),
+        ({"supply_negative_psi": 1.7}, "absolute pressure, but gauge is expected; write -13"),
         ({"supply_negative_psi": 3.0}, "its sign is reversed; write -3"),
         ({"supply_positive_psi": -13.0, "supply_negative_psi": 8.5}, "the supplies are exchanged"),
         ({"mu_s": 45.0}, "the model is limited to 0.02 to 2; check number and unit"),

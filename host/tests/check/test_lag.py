@@ -1,4 +1,4 @@
-"""The lag of displacement against pressure, on another world's robot, shifted on purpose."""
+"""The lag of displacement behind pressure, on records of the virtual robot that are shifted by a known time."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from .days import head_only, with_columns
 
 
 def recorded(*experiments, **effects):
-    """Steps and walks of a robot with these effects, sizes as factors of their modest ones."""
+    """Steps and walks of a robot with these effects, their sizes as multiples of the modest ones."""
     random = np.random.default_rng(3)
     parameters, curves = specimen(random)
     inside = {name: EFFECTS[name].at(size, random) for name, size in effects.items()}
@@ -35,7 +35,7 @@ def session():
 
 
 def late(trial, late_s):
-    """The same trial, its displacement stamped so much late."""
+    """The same trial with its displacement stamped `late_s` late."""
     at = np.clip(trial.time_s - late_s, 0.0, None)
     moved = {n: CubicSpline(trial.time_s, v)(at) for n, v in trial.columns.items() if n.startswith("displacement")}
     return with_columns(trial, **moved)
@@ -68,7 +68,7 @@ def test_a_trial_that_does_not_fit_the_others_is_named_with_its_lag(session):
     (found,) = findings([*session[:-1], late(wrong, -0.01)])
     assert found.file == wrong.file
     assert str(found).startswith(f"{wrong.file}: the displacement is ")
-    assert "ms early relative to the pressures, in the session's other trials" in str(found)
+    assert "ms early relative to the pressures, but " in str(found)
     assert misfit_of(late(wrong, -0.01), session[:-1]).startswith(f"{wrong.file}: the displacement is ")
     assert misfit_of(wrong, session[:-1]) is None
 
@@ -77,7 +77,7 @@ def test_a_shift_of_all_trials_is_one_finding(session):
     (found,) = findings([late(trial, 0.012) for trial in session])
     assert found.file is None
     assert "ms late relative to the pressures: a shift between the instruments" in str(found)
-    assert not findings([late(trial, -0.007) for trial in session])  # a sensor's filter
+    assert not findings([late(trial, -0.007) for trial in session])  # what a sensor's filter may cause
 
 
 def test_a_first_trial_is_judged_by_itself(session):

@@ -1,4 +1,4 @@
-"""`bifa check` says what seems to be a mistake, once where it is the same in many files."""
+"""`bifa check` reports suspected mistakes, and a mistake common to many files only once."""
 
 import pytest
 from typer.testing import CliRunner
@@ -13,7 +13,7 @@ from .days import mistaken, turned
 
 @pytest.fixture
 def shown(tmp_path, day, monkeypatch):
-    """What the command prints of the day with the forces of these trials turned."""
+    """Exit status and output of the command for a day with reversed forces in the given trials."""
     monkeypatch.setenv("COLUMNS", "400")
 
     def check(*files: str) -> tuple[int, str]:
@@ -30,7 +30,7 @@ def shown(tmp_path, day, monkeypatch):
 def test_a_mistake_is_a_warning_with_its_file(shown):
     status, output = shown("anchor_5psi_2.csv")
     assert status == 1
-    assert "warning [sign] anchor_5psi_2.csv, force_N: -" in output
+    assert "warning [sign] anchor_5psi_2.csv, force_N: the median is -" in output
     assert output.count("warning") == 1
 
 
@@ -38,7 +38,7 @@ def test_the_same_in_many_files_is_said_once(shown):
     files = [f"anchor_{psi}psi_{repeat}.csv" for psi in ("0", "5", "8.5") for repeat in (1, 2, 3)]
     _, output = shown(*files)
     assert output.count("warning") == 1
-    assert "warning [sign] 9 trials, force_N: -" in output
+    assert "warning [sign] 9 trials, force_N: the median is -" in output
     assert f"  {'; '.join(files)}\n" in output
 
 

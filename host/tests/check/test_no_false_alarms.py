@@ -1,4 +1,4 @@
-"""Strong effects, foreign robots, instruments with clocks of their own, any gait: none of it passes for a mistake."""
+"""No false alarms from strong effects, foreign robots, instruments with their own clocks, or any gait."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from virtual_robot.truths.foreign.effects import EFFECTS as FOREIGN_EFFECTS
 
 from .days import drawn, head_only
 
-STRONG = ["sensor_calibration", "backlash", "leak", "choked_flow", "pump_fade"]  # slides: the fixture `day`
+STRONG = ["sensor_calibration", "backlash", "leak", "choked_flow", "pump_fade"]  # sliding walks: the fixture `day`
 
 
 def assert_nothing_is_found(day):

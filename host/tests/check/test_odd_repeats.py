@@ -1,4 +1,4 @@
-"""A repeat that was none is found, and a record that stands in two trials; a lab's ordinary scatter is not."""
+"""Repeats of a different condition and copied records are found; a lab's ordinary scatter is accepted."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ ENDS = ("displacement_head_mm", "displacement_tail_mm")
 
 
 def recorded_as(day, other: str):
-    """Another trial's record under this one's name."""
+    """Put another trial's record under this trial's name."""
     columns = next(trial.columns for trial in day.trials if trial.file == other)
     return lambda trial: replace(trial, columns=columns)
 
@@ -46,7 +46,7 @@ def test_another_scale_of_the_camera_is_named_with_how_much_it_makes(any_day):
 
 
 def late(samples: int):
-    """Recording began so much later."""
+    """Start the recording `samples` samples later."""
     return lambda trial: replace(trial, columns={name: values[samples:] for name, values in trial.columns.items()})
 
 

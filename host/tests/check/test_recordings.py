@@ -26,7 +26,7 @@ def sound() -> Dataset:
 
 
 def damaged(file: str, **columns) -> list:
-    """The findings after some columns of one file were changed by a function of the values."""
+    """The findings after each given column of one file was passed through a function."""
 
     def change(trial):
         return with_columns(trial, **{name: f(trial.columns[name].copy()) for name, f in columns.items()})
@@ -50,7 +50,7 @@ def held_over(values, start, stop):
 
 def test_a_slow_camera_is_pointed_out_though_its_samples_are_taken_at_the_unos():
     trial = replace(make_trial("step_response", 1), extra={"camera_rate_hz": 60.0})
-    assert "the camera recorded 60 samples a second" in " ".join(map(str, check_recording(trial)))
+    assert "the camera recorded at 60 Hz" in " ".join(map(str, check_recording(trial)))
 
 
 def test_a_sound_data_set_has_no_findings():
@@ -91,7 +91,7 @@ def test_a_snap_through_is_no_spike_and_a_coarse_sensor_is_not_clipped():
 
 def test_a_pressure_of_the_wrong_sign_is_called_that():
     (found,) = damaged("anchor_pull_2.csv", pressure_psi=lambda x: -x)
-    assert str(found).endswith("psi on average where 8.5 psi was commanded: its sign is reversed")
+    assert str(found).endswith("psi on average, but 8.5 psi was commanded: its sign is reversed")
 
 
 def test_an_actuator_that_vacuum_draws_in_begins_where_it_should():

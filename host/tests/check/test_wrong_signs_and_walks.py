@@ -1,4 +1,4 @@
-"""Signs against the convention, mirrored cameras, exchanged tubes and columns, and gaits that were not walked."""
+"""Wrong signs, mirrored cameras, exchanged tubes or columns, and gaits that were not walked are found."""
 
 import pytest
 
@@ -57,8 +57,8 @@ def test_a_column_of_the_wrong_sign(any_day, experiment, column):
 
 def test_of_a_wrong_sign_the_number_the_convention_and_what_to_do_are_said(day):
     (found,) = check_plausibility(mistaken(day, "anchor_8.5psi_2.csv", turned("force_N")))
-    assert str(found).startswith("anchor_8.5psi_2.csv, force_N: -")
-    assert "N in the middle (median), where a resistance is positive" in str(found)
+    assert str(found).startswith("anchor_8.5psi_2.csv, force_N: the median is -")
+    assert "N, but a resistance is positive" in str(found)
     assert str(found).endswith("Reverse the sign")
 
 
@@ -67,8 +67,8 @@ def test_exchanged_commands_are_told_from_exchanged_pressures_by_the_gait(any_da
     names = " and ".join(pair)
     for trial in any_day.of("locomotion"):
         for columns, words in (
-            ("command_{}", f"the command columns of {names} are exchanged, as the gait says too"),
-            ("pressure_{}_psi", f"the pressures' columns, sensors or tubes of {names} are exchanged"),
+            ("command_{}", f"the command columns of {names} are exchanged, as the gait confirms"),
+            ("pressure_{}_psi", f"pressure columns, sensors or tubes of {names} are exchanged"),
         ):
             change = exchanged(*(columns.format(chamber) for chamber in pair))
             (found,) = check_plausibility(mistaken(any_day, trial.file, change))
@@ -102,7 +102,7 @@ def test_the_walk_whose_gait_it_is_is_named(day):
 @pytest.mark.parametrize(
     ("gait", "cause"),
     [
-        ({"psi12_deg": 120.0, "psi13_deg": 300.0}, "a phase is how far head and tail are ahead of the body"),
+        ({"psi12_deg": 120.0, "psi13_deg": 300.0}, "a phase says how far head and tail are ahead of the body"),
         ({"duty_body": 0.44}, "a duty is the part of the cycle at vacuum"),
         ({"period_s": 3.0}, "the robot did not walk the gait in dataset.toml"),
     ],

@@ -1,4 +1,4 @@
-"""Forces and lengths in another unit, or in each other's columns: found in the very file, with the unit named."""
+"""Forces and lengths in another unit or in each other's columns are found in the right file, and the unit is named."""
 
 from dataclasses import replace
 
@@ -63,7 +63,7 @@ def test_a_cross_head_that_was_set_otherwise_is_found(any_day, rate_mm_s):
     trial = next(t for t in any_day.of("static_loading") if t.rate_mm_s == 2.0)
     wrong = mistaken(any_day, trial.file, lambda t: replace(t, rate_mm_s=rate_mm_s))
     (found,) = units_found(wrong)
-    assert f"moves at 2 mm/s where rate_mm_s = {rate_mm_s:g}" in found[2]
+    assert f"moves at 2 mm/s, but rate_mm_s = {rate_mm_s:g}" in found[2]
 
 
 def test_a_fit_says_so_before_it_fails(day, tmp_path):

@@ -1,4 +1,4 @@
-"""What holds for every command: help, version, names of options, targets checked first, completion, Ctrl-C."""
+"""Properties of every command: help, version, option names, early checks of output paths, completion, Ctrl-C."""
 
 import json
 import os
@@ -64,7 +64,7 @@ def test_every_command_has_both_helps_and_the_same_names_for_the_same_things(com
     ids=" ".join,
 )
 def test_where_it_cannot_write_a_command_says_so_before_it_does_anything(tmp_path, arguments):
-    """What it would read is no data set, model or port either, and that is not what it complains of."""
+    """An unwritable output is reported first, even though the inputs are no valid data set, model or port either."""
     places = {name: tmp_path / name for name in ("day", "file", "missing")}
     places["day"].mkdir()
     places["file"].write_text("")
@@ -127,7 +127,7 @@ print(json.dumps(found))
 
 
 def tried(commands, folder) -> list[tuple[int, set[str]]]:
-    """Status of each command, one after the other in one process, and the packages that are imported by its end."""
+    """Run the commands in turn in one process; return each one's status and the packages imported by its end."""
     ended = subprocess.run(
         [sys.executable, "-c", _TRIED, json.dumps(commands)], cwd=folder, capture_output=True, text=True
     )
@@ -155,7 +155,7 @@ def test_ctrl_c_says_what_became_of_the_work(monkeypatch):
 
 
 def completed(shell: str, words: str) -> str:
-    """What the shell is offered after `words`, a command line that ends in the word to complete."""
+    """The completions offered to the shell for `words`, a command line that ends in the word to complete."""
     environment = os.environ | {
         "_BIFA_COMPLETE": f"complete_{shell}",
         "_TYPER_COMPLETE_ARGS": words,

@@ -1,4 +1,4 @@
-"""Help fits the terminal, whatever its width: it fills the lines, and cuts nothing off."""
+"""Help fits a terminal of any width: it fills the lines and truncates nothing."""
 
 import inspect
 import json
@@ -23,12 +23,12 @@ for name in [[], *([command.callback.__name__] for command in app.registered_com
     helps[" ".join(name)] = said.getvalue()
 print(json.dumps(helps))
 """
-MARGINS = 4  # columns, of both ends of a line
+MARGINS = 4  # columns, both sides of a line together
 
 
 @pytest.fixture(scope="module", params=[60, 80, 120, 200])
 def shown(request):
-    """A terminal's width, and on it the help of bifa ("") and of every command."""
+    """A terminal's width, and the help of bifa (key "") and of every command at that width."""
     environment = os.environ | {"COLUMNS": str(request.param)}
     done = subprocess.run([sys.executable, "-c", SHOW], capture_output=True, text=True, env=environment, check=True)
     return request.param, json.loads(done.stdout)

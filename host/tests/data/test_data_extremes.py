@@ -1,4 +1,4 @@
-"""Data sets made to hurt: numbers beyond reason, keys of kilobytes, names that a terminal would obey."""
+"""Hostile data sets: extreme numbers, keys of kilobytes, names that contain terminal escape sequences."""
 
 import tracemalloc
 
@@ -13,7 +13,7 @@ from bifa.robot.gait import GaitError, load_gait
 from harness.data_sets import make_dataset
 
 WALK = "locomotion_1.csv"
-TITLE = "\x1b]0;owned\x07"  # sets a window's title
+TITLE = "\x1b]0;owned\x07"  # sets the window's title
 CLIPBOARD = "\x1b]52;c;cm0gLXJm\x07"
 EXTREMES = ["1e308", "-1e308", "1.79e308", "1e12", "-1e12", "1.0001e12", "5e-324", "1e-300", "-0.0", "1e5"]
 HARD_TO_SEARCH = ['x = "' + '\\"' * 200_000 + '"', "'" * 200_001, '"' * 200_001, "a" * 300_000, "a." * 99_000]
@@ -72,14 +72,14 @@ def test_a_key_of_kilobytes_is_refused_at_little_cost(tmp_path, key, form):
         read_dataset(tmp_path)
     with pytest.raises(GaitError, match="at line 1"):
         load_gait(tmp_path / "gait.toml")
-    assert tracemalloc.get_traced_memory()[1] < 10e6  # one of them took 1.6 GB, and 18 s to fill them
+    assert tracemalloc.get_traced_memory()[1] < 10e6  # without the limit, one of them took 1.6 GB and 18 s
     tracemalloc.stop()
 
 
 @pytest.mark.parametrize("text", HARD_TO_SEARCH, ids=range(len(HARD_TO_SEARCH)))
 def test_looking_for_such_keys_costs_little_itself(tmp_path, text):
     (tmp_path / "dataset.toml").write_text(text)
-    with pytest.raises(DatasetError):  # after hours, if the search began anew at every character
+    with pytest.raises(DatasetError):  # a search restarted at every character would take hours
         read_dataset(tmp_path)
 
 

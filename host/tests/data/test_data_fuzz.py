@@ -1,4 +1,4 @@
-"""Random damage: the reader either refuses with a place, or has read exactly what the file says."""
+"""Random damage: the reader either refuses the file and names the place, or reads exactly what the file says."""
 
 import csv
 import random
@@ -38,11 +38,11 @@ def damage(raw: bytes, rng: random.Random) -> bytes:
 
 
 def assert_read_exactly(dataset) -> None:
-    """Compare with Python's own csv and float, field by field."""
+    """Compare with Python's `csv` and `float`, field by field."""
     for trial in dataset.trials:
         with (dataset.path / trial.file).open(newline="", encoding="utf-8-sig") as file:
             lines = file.read().replace("\ufeff", "").replace("\r\n", "\n").split("\n")
-        header, *rows = (next(csv.reader([line], skipinitialspace=True), []) for line in lines)  # none goes on below
+        header, *rows = (next(csv.reader([line], skipinitialspace=True), []) for line in lines)  # no quoted line break
         while not "".join(rows[-1]).strip():  # blank lines at the end
             rows.pop()
         assert sorted(name.strip() for name in header) == sorted(trial.columns)

@@ -1,4 +1,4 @@
-"""What the reader accepts, and the place and reason that it names for what it refuses."""
+"""What the reader accepts, and the place and reason it gives for what it refuses."""
 
 import os
 import re
@@ -68,7 +68,7 @@ def edit_lines(change):
 
 
 def edit_row(line, column, text):
-    """Replace one field of the walk's file."""
+    """Replace one field of the walk's CSV file."""
 
     def change(lines):
         fields = lines[line - 1].split(",")
@@ -159,7 +159,7 @@ def replace(old, new, count=1):
 
 
 def add(key):
-    """To the second trial."""
+    """Add a key to the second trial."""
     return replace("repeat = 2", f"repeat = 2\n{key}")
 
 
@@ -253,7 +253,7 @@ def test_no_table_and_no_folder(tmp_path):
 
 
 def test_a_folder_above_a_data_set_is_told_its_name(folder):
-    with pytest.raises(DatasetError, match=f"is not a data set, but contains bench: name {folder}"):
+    with pytest.raises(DatasetError, match=f"is not a data set, but contains bench: use {folder}"):
         read_dataset(folder.parent)
 
 

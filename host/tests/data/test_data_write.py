@@ -1,4 +1,4 @@
-"""The writer: exact, never over another, never half; a session goes on after an interruption."""
+"""The writer is exact, never overwrites a data set or leaves half of one, and resumes an interrupted session."""
 
 import os
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Files as instruments write them: each named program by its preset, each key of a declaration, faults by cell."""
+"""Instrument exports: every preset, every key of a declaration, and faults reported by cell."""
 
 import re
 import tempfile
@@ -83,7 +83,7 @@ DATED = SIMPLE.replace('time_s = "s"', 'time_s = "date"')
 
 
 def read(folder, content, text=SIMPLE, encoding="utf-8"):
-    """The columns of a file with this content, as declared."""
+    """The columns of a file with this content, read by the declaration `text`."""
     (folder / "a.csv").write_text(content, encoding=encoding)
     return read_export(folder / "a.csv", declared(text), MACHINE)[0]
 
@@ -115,7 +115,7 @@ def test_a_camera_with_another_origin_has_an_offset(tmp_path):
 @pytest.mark.parametrize("zone", ["Europe/Berlin", "America/New_York", "UTC"])
 @pytest.mark.parametrize("form", [None, "%d.%m.%Y %H:%M:%S.%f"])
 def test_dates_are_read_as_the_moments_that_they_are(tmp_path, zone, form):
-    """Across the hour in which clocks are put back."""
+    """Times stay 0.25 s apart across the end of daylight saving time."""
     begin = datetime(2026, 10, 25, 0, 59, 59, tzinfo=ZoneInfo("UTC"))
     moments = [begin + timedelta(milliseconds=250 * k) for k in range(8)]
     told = [m.isoformat() if form is None else m.astimezone(ZoneInfo("UTC")).strftime(form) for m in moments]
@@ -130,7 +130,7 @@ def test_a_date_in_two_columns_and_one_that_is_none(tmp_path):
     text = DATED.replace('"t"', '"Date + Time"') + 'date_format = "%Y/%m/%d %H:%M:%S.%f"\n'
     begin = "Date,Time,x,F\n2026/11/25,10:00:00.5,1,2\n"
     assert read(tmp_path, begin + "2026/11/25,10:00:01.0,1,2\n", text)["time_s"].tolist() == [0.0, 0.5]
-    said = r"line 3, column Date \+ Time: '25\.11\.2026 10:00:01\.0' is no date of the"
+    said = r"line 3, column Date \+ Time: '25\.11\.2026 10:00:01\.0' is not a date of the"
     with pytest.raises(DatasetError, match=said):
         read(tmp_path, begin + "25.11.2026,10:00:01.0,1,2\n", text)
 
@@ -214,7 +214,7 @@ def test_a_row_of_units_and_the_declaration_have_to_agree(tmp_path):
     [
         (SIMPLE.replace("force_N =", "force_kN ="), r"instrument\.machine\.columns: force_kN is not a column"),
         (SIMPLE.replace('_N = "N"', '_N = "mm"'), r"line 3, .*units: force_N is 'mm'; it must be one of N, kN"),
-        (SIMPLE.replace(', force_N = "N"', ""), r"units: force_N has no unit: declare the one in the file.*N \| kN"),
+        (SIMPLE.replace(', force_N = "N"', ""), r"units: force_N has no unit: declare its unit in the file.*N \| kN"),
         (SIMPLE + "skip_row = 2\n", r"line 4, .*skip_row: unknown key"),
         (SIMPLE + "skip_rows = -2\n", r"skip_rows: -2 is outside"),
         (SIMPLE + 'preset = "bluehil"\n', r"preset: 'bluehil' is unknown; it must be one of arduino"),
@@ -272,7 +272,7 @@ FORMS += ['encoding = "utf-16"', "skip_rows = 2\nheader_rows = 2", "units_rows =
     st.sampled_from([b"t,x,F\n", b"t;x;F\n", b"t\tx\tF\n", b"t x F\n", b""]),
 )
 def test_any_bytes_are_read_or_refused(content, form, names):
-    """Quotes that are left open, lines that end in the middle, rows of any length, other encodings."""
+    """Open quotes, truncated lines, rows of any length and wrong encodings never crash the reader."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "a.csv").write_bytes(names + content)
         for work in (lambda p: read_export(p, declared(SIMPLE + form), MACHINE), look):

@@ -1,4 +1,4 @@
-"""Pages say what is so: rooms, docstrings, the demo's story, and what the firmware knows and says."""
+"""The pages match the code: rooms, docstrings, the demo's output, and the firmware's parameters, faults and errors."""
 
 import importlib
 import re

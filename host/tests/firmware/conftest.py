@@ -6,28 +6,28 @@ from harness.chip import VALVES, Chip
 
 
 class Bench(Chip):
-    """The real image on the simulated board, sensors at zero and alive, after its start."""
+    """The real image on the simulated board, after start-up, with working sensors at zero pressure."""
 
     def __init__(self, eeprom: bytes | None = None) -> None:
         super().__init__(keep_events=True, eeprom=eeprom)
         self.listen(0.2)
 
     def listen(self, seconds: float) -> bytes:
-        """Let time pass; return what was sent meanwhile, frames included."""
+        """Let time pass; return everything sent meanwhile, including frames."""
         self.sleep(seconds)
         return self.uno.receive()
 
     def wait(self, seconds: float) -> str:
-        """Let time pass; return what was printed meanwhile."""
+        """Let time pass; return the text printed meanwhile."""
         return self.listen(seconds).decode(errors="replace")
 
     def say(self, line: str, seconds: float = 0.1) -> str:
-        """Send a line; return what was printed within `seconds`."""
+        """Send a line; return the text printed within `seconds`."""
         self.uno.send(line.encode() + b"\n")
         return self.wait(seconds)
 
     def send_all(self, data: bytes) -> None:
-        """Send, until the last byte has arrived."""
+        """Send `data` and run until its last byte has arrived."""
         self.uno.send(data)
         while self.uno.bytes_on_the_wire:
             self.uno.run_until(self.uno.cycle + 16)

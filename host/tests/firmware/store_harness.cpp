@@ -1,4 +1,4 @@
-// The store over an EEPROM in which writes take time, wear is counted, cells go bad and the power may be cut.
+// The store on a fake EEPROM: writes take time, wear is counted, cells may be stuck and the power may fail.
 #include <stdlib.h>
 
 #include "store.h"
@@ -18,7 +18,7 @@ class FakeEeprom {
     ++wear[address];
     busy_polls = 3;
     if (cut_at == writes) {
-      // The cell is between two values when the power goes: the caller says what is found in it.
+      // The power fails while the cell changes: the caller chooses the value that it is left with.
       if (cut_leaves >= 0) bytes[address] = static_cast<uint8_t>(cut_leaves);
       if (cut_leaves == -2) bytes[address] = value;
       powerless = true;
@@ -32,7 +32,7 @@ class FakeEeprom {
   uint16_t stuck[bifa::kEepromBytes] = {};
   uint32_t writes = 0;
   uint32_t cut_at = 0;  // number of the write that fails; 0: none
-  int cut_leaves = -1;  // -1: the old value, -2: the new one, else that byte
+  int cut_leaves = -1;  // -1: the old value, -2: the new one, otherwise this byte
   bool powerless = false;
   int busy_polls = 0;
 };
@@ -41,7 +41,7 @@ struct Bench {
   FakeEeprom eeprom;
   bifa::Store stored;
 
-  /// The store, with its own EEPROM in place.
+  /// The store, after connecting it to this bench's EEPROM.
   bifa::Store& store();
 };
 
@@ -76,7 +76,7 @@ void bench_stick(Bench* bench, uint16_t address, uint8_t value) { bench->eeprom.
 uint32_t bench_writes(Bench* bench) { return bench->eeprom.writes; }
 uint32_t bench_wear(Bench* bench, uint16_t address) { return bench->eeprom.wear[address]; }
 
-// Polls until the store has nothing left to do, repairs included; -1: the power was cut.
+// Polls until the store has finished, repairs included; returns its result, or -1 if the power failed.
 int bench_finish(Bench* bench) {
   for (uint32_t idle = 0, before = bench->eeprom.writes; idle < 200; ++idle) {
     if (bench->eeprom.powerless) return -1;

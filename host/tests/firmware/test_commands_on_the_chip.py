@@ -1,4 +1,4 @@
-"""What a command may do when something in it, or before it, was wrong."""
+"""Commands that are invalid or come in the wrong state or order, and the console's answers."""
 
 import pytest
 
@@ -97,7 +97,7 @@ def test_stop_that_is_typed_behind_a_torn_frame_is_carried_out(bench):
 def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench):
     uno = connected(bench.uno)
     status, clear = encoded(uno, "status", "clear")
-    bench.say("help", 0.001)  # while it prints the others wait
+    bench.say("help", 0.001)  # while this prints, the others wait
     bench.uno.send(status + b"!" + clear)
     bench.wait(1.0)
     assert "state idle" in bench.say("status", 0.5)
@@ -105,7 +105,7 @@ def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench
 
 def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(bench):
     uno = connected(bench.uno)
-    uno.upload({"period_s": 20.0, "host_timeout_s": 60.0})  # nobody talks to it for a cycle
+    uno.upload({"period_s": 20.0, "host_timeout_s": 60.0})  # no host talks to it for a whole cycle
     uno.run()
     bench.wait(1.0)
     assert len(bench.valves_on) == 3
@@ -113,9 +113,9 @@ def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(be
     before = bench.valves_on
     assert "ok" in bench.say("set pressure_psi 5", 0.3)
     assert bench.uno.dac_code == 5000 * 4096 // 130_000
-    assert bench.valves_on == before, "the waiting set was taken over in mid-cycle"
+    assert bench.valves_on == before, "the waiting set was applied in mid-cycle"
     bench.wait(20.0)
-    assert bench.valves_on == [4, 6, 8], "at the boundary all are positive for good"
+    assert bench.valves_on == [4, 6, 8], "from the boundary on, all chambers stay positive"
     assert "[pressure_psi 5 psi (0 to 14 psi, default 8.5 psi) * power-up 8.5 psi\r\n" in bench.say("show pressure_psi")
 
 
@@ -136,7 +136,7 @@ def test_answers_have_units_ranges_and_marks(bench):
 def test_version_and_stream_say_what_they_are(bench):
     assert f"protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}, started by " in bench.say("version")
     header = "[>sequence,time_us,state,psi body,head,tail,command body,head,tail,phase_deg body,head,tail\r\n"
-    for _ in range(2):  # also while it streams
+    for _ in range(2):  # again, while it streams
         assert header in bench.say("stream on", 0.3)
 
 
@@ -190,7 +190,7 @@ def test_set_that_waited_when_the_walk_ended_is_that_of_the_next_walk(bench):
     uno.upload({"period_s": 20.0, "duty_body": 0.0, "duty_head": 0.0, "duty_tail": 0.0}, wait=False)
     uno.session.call_all([("stop", ()), ("run", ())])
     bench.wait(0.1)
-    assert bench.valves_on == [4, 6, 8], "positive for good"
+    assert bench.valves_on == [4, 6, 8], "all chambers stay positive"
 
 
 def test_host_that_waits_for_the_eeprom_is_not_silent(bench):
@@ -201,4 +201,4 @@ def test_host_that_waits_for_the_eeprom_is_not_silent(bench):
     assert bench.uno.eeprom_writes > 0
     assert "host_silent" not in bench.wait(0.25)
     assert bench.valves_on
-    assert "host_silent" in bench.wait(1.0), "now it is"
+    assert "host_silent" in bench.wait(1.0), "now the host is silent"

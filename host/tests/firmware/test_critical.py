@@ -1,4 +1,4 @@
-"""The guard against interrupts, as the compiler of the image understands it."""
+"""The interrupt guard, as compiled by the image's compiler."""
 
 import re
 import subprocess
@@ -30,7 +30,7 @@ uint8_t reads() {
 
 
 def instructions(tmp_path, function: str) -> list[str]:
-    """Those of `function`, as `avr-g++ -Os` makes them; what it stores or loads by the name of the variable."""
+    """Instructions of `function` as compiled by `avr-g++ -Os`; loads and stores name their variable."""
     source = tmp_path / "guarded.cpp"
     source.write_text(SOURCE)
     command = [

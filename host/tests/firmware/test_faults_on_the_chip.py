@@ -1,4 +1,4 @@
-"""Faults as the image meets them: DAC, bus, watchdog, brown-out, host, and what no path may command."""
+"""Faults of DAC, bus, regulator, supply, sensors and serial line, and limits that no path may exceed."""
 
 import itertools
 import struct
@@ -44,7 +44,7 @@ def test_no_eeprom_commands_more_than_14_psi(new_bench, bench):
 
 
 def monitor_volts(pressure_psi: float) -> float:
-    """What the regulator's monitor says of a pressure: 1 to 5 V is 0 to 130 psi."""
+    """Output of the regulator's monitor: 1 to 5 V for 0 to 130 psi."""
     return 1 + pressure_psi * 4 / 130
 
 
@@ -53,15 +53,15 @@ def test_regulator_that_does_not_follow_its_set_point_vents_and_names_itself(ben
     bench.say("run")
     bench.wait(1.5)
     assert bench.valves_on
-    bench.uno.set_analog(MONITOR, monitor_volts(16.0))  # 7.5 psi off, 6.7 are borne
+    bench.uno.set_analog(MONITOR, monitor_volts(16.0))  # 7.5 psi off; 6.7 psi are tolerated
     bench.wait(2.2)
-    assert bench.valves_on, "for 2.5 s it may be on its way"
+    assert bench.valves_on, "the regulator has 2.5 s to follow"
     bench.wait(0.4)
     assert not bench.valves_on
     fault = next(line for line in bench.say("status", 0.5).splitlines() if line.startswith("[fault"))
     words = fault.split()
     assert words[1] == "regulator"
-    assert int(words[words.index("value") + 1]) == pytest.approx(16_000, abs=160)  # a count is 0.16 psi
+    assert int(words[words.index("value") + 1]) == pytest.approx(16_000, abs=160)  # one count is 0.16 psi
     assert int(words[words.index("limit") + 1]) == 8500
     assert bench.uno.dac_code == 0
     assert "error" in bench.say("clear")
@@ -72,7 +72,7 @@ def test_regulator_that_does_not_follow_its_set_point_vents_and_names_itself(ben
 
 @pytest.mark.parametrize("supply_V", [4.5, 4.75, 5.25])
 def test_supply_of_the_board_is_not_taken_for_a_regulator_that_does_not_follow(bench, supply_V):
-    """The simulated reference is 5 V; the monitor's volts do not follow the board's supply, the DAC does."""
+    """The DAC's output scales with the supply, the monitor's voltage does not. (The simulated reference is 5 V.)"""
     for set_point_psi in (0, 8.5, 14):
         bench.say(f"set pressure_psi {set_point_psi}")
         bench.uno.set_analog(MONITOR, monitor_volts(set_point_psi * supply_V / 5) * 5 / supply_V)
@@ -128,7 +128,7 @@ def test_sensor_with_a_loose_wire_vents_whatever_pressure_is_behind_it(bench, be
 
 
 def lose_a_sensor(bench):
-    """For an instant, but for long enough."""
+    """Disconnect a sensor briefly, but for long enough to be a fault."""
     bench.volts[1] = 0.02
     bench.wait(0.1)
     bench.volts[1] = 2.5
@@ -154,9 +154,9 @@ def test_what_waits_when_a_fault_comes_does_not_undo_it(bench, first, lose, name
     lose(bench)
     said = bench.wait(2.0)
     assert not bench.valves_on
-    assert said.count("error") == 2, "both lines are answered"
+    assert said.count("error") == 2, "both waiting lines are refused"
     assert name in bench.say("status")
-    assert bench.say("clear").rstrip().endswith("ok"), "one that comes after the fault"
+    assert bench.say("clear").rstrip().endswith("ok"), "a clear sent after the fault is accepted"
     assert bench.say("run").rstrip().endswith("ok")
 
 
@@ -195,7 +195,7 @@ def test_bytes_that_arrive_at_another_speed_are_counted_and_carry_out_nothing(be
 
 
 def test_bytes_that_the_receiver_lost_are_counted(bench):
-    """As if interrupts were off for 0.3 ms in the middle of a line: without what is lost, it sets another value."""
+    """A line that loses bytes to 0.3 ms without interrupts is refused; the rest would set another value."""
     bench.uno.send(b"set period_s 41.5\n")
     bench.uno.run_for(15 * 40e-6)
     bench.uno.hold(300e-6)

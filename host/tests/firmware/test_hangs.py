@@ -1,4 +1,4 @@
-"""Wherever the program hangs the valves fall within 0.6 s, the chip restarts, and it says why it did."""
+"""Wherever the program hangs, the valves are off within 0.6 s, and the chip restarts and reports the cause."""
 
 import pytest
 
@@ -8,7 +8,7 @@ pytestmark = pytest.mark.uno
 
 LIMIT_S = 0.6
 TICK = "__vector_11"  # TIMER1_COMPA
-IN_THE_MIDDLE = 0.3  # of the function: past what it begins with
+IN_THE_MIDDLE = 0.3  # share of the function's length: past its prologue
 BOOTLOADER_S = 1.0
 
 
@@ -50,7 +50,7 @@ def test_program_that_hangs_vents_and_restarts_into_a_fault_that_says_so(bench, 
     bench.uno.hang(interrupts)
     bench.wait(0.8)
     valves_fell_and_chip_restarted(bench, first, begin)
-    hidden = optiboot and not interrupts  # no instruction could leave a mark, and the bootloader clears the flag
+    hidden = optiboot and not interrupts  # no code ran to leave a mark, and the bootloader clears the flag
     expected = "restart" if hidden else "watchdog"
     assert cause(bench) == expected
     assert f"[fault {expected}" in bench.say("status", 0.5)
@@ -59,7 +59,7 @@ def test_program_that_hangs_vents_and_restarts_into_a_fault_that_says_so(bench, 
 
 
 def test_clock_that_stops_restarts_the_chip_though_the_main_loop_goes_on(bench):
-    """With bytes coming in all the time the main loop never sleeps; the valves would stay as they are for ever."""
+    """Arriving bytes keep the main loop awake; without a restart, the valves would stay as they are forever."""
     bench.say("run")
     first, begin = bench.uno.event_count, bench.uno.cycle
     no_more_ticks = b"\x00"
@@ -83,7 +83,7 @@ def test_count_of_unfed_milliseconds_that_is_past_its_limit_vents_at_once(bench)
 
 
 def test_main_loop_and_tick_that_only_take_long_are_no_hang(bench):
-    """The longest answers, one after the other with no pause."""
+    """Twenty of the longest answers without a pause cause no restart."""
     bench.say("echo on")
     bench.say("run")
     bench.uno.send(b"help\r" * 20)
@@ -92,7 +92,7 @@ def test_main_loop_and_tick_that_only_take_long_are_no_hang(bench):
     assert bench.valves_on
 
 
-CAUSES = {  # what starts the chip -> what it says without a bootloader, and with the one that Unos have
+CAUSES = {  # reset -> cause reported without a bootloader, and with the stock bootloader
     "power-on": ("power", "power"),
     "external": ("external", "external"),
     "brown-out": ("brown_out", "restart"),
@@ -103,7 +103,7 @@ CAUSES = {  # what starts the chip -> what it says without a bootloader, and wit
 @pytest.mark.parametrize("event", CAUSES)
 def test_chip_says_why_it_started(bench, event, optiboot):
     bench.uno.use_optiboot(optiboot)
-    bench.uno.reset("external", BOOTLOADER_S)  # a port was opened before
+    bench.uno.reset("external", BOOTLOADER_S)  # as if a port had been opened before
     bench.wait(BOOTLOADER_S + 0.2)
     bench.uno.reset(event, BOOTLOADER_S if optiboot and event == "external" else 0)
     bench.wait(BOOTLOADER_S + 0.2)
@@ -111,7 +111,7 @@ def test_chip_says_why_it_started(bench, event, optiboot):
 
 
 def test_unknown_bootloader_whose_wait_was_never_seen_is_no_reason_for_a_fault(bench):
-    """It clears the flags as the stock one does, but leaves the registers alone: what can have been a button is one."""
+    """It clears the reset flags but, unlike the stock one, leaves no trace: a possible reset button counts as one."""
     bench.uno.use_optiboot()
     bench.uno.reset("power-on")
     bench.wait(0.2)

@@ -1,4 +1,4 @@
-"""The bound of the stack is read off the image: frames, calls, and what is called through a pointer."""
+"""The stack bound is computed from the image: frames, calls, and calls through pointers."""
 
 import pytest
 
@@ -66,4 +66,4 @@ def test_image_keeps_its_budgets_and_its_parts_are_all_of_it():
     costs = parts.costs()
     assert sum(in_flash for in_flash, _ in costs.values()) == flash - bench_uno.REAL_DAC_LIBRARY_BYTES
     assert sum(in_ram for _, in_ram in costs.values()) == ram - bench_uno.REAL_DAC_LIBRARY_RAM_BYTES
-    assert costs[parts.REST][0] < 1000, "what no symbol claims"
+    assert costs[parts.REST][0] < 1000, "bytes that no symbol claims"

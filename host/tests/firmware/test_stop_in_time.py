@@ -12,7 +12,7 @@ pytestmark = pytest.mark.uno
 
 LIMIT_CYCLES = CLOCK_HZ // 10_000
 BYTE_CYCLES = CLOCK_HZ * 10 // 250_000
-TWCR, BUSY = 0xBC, 0x20 | 0x10  # a start or a stop is asked for
+TWCR, BUSY = 0xBC, 0x20 | 0x10  # a start or stop condition is pending
 
 
 def walking(bench):
@@ -21,7 +21,7 @@ def walking(bench):
 
 
 def walk_with_a_bus_that_cannot_end_its_transfer(bench):
-    """To the microsecond at which a transfer begins that something holds before its end."""
+    """Walk up to the microsecond at which a transfer begins, and hold the bus so that it cannot end."""
     walking(bench)
     for _ in range(200_000):
         bench.uno.run_until(bench.uno.cycle + 16)
@@ -86,7 +86,7 @@ def test_stop_byte(bench, state, phase_us):
     assert arrived - begin >= waiting * BYTE_CYCLES
     assert all_off_after(bench, first, arrived - 32) <= LIMIT_CYCLES
     bench.wait(1.2)
-    bench.say("")  # ends a line that was cut short
+    bench.say("")  # end a truncated line
     assert "state stopped" in bench.say("status", 0.3)
     assert not bench.valves_on
 
@@ -143,7 +143,7 @@ def stop_frame(bench):
 
 
 def tap(bench):
-    """The emergency stop, for an instant."""
+    """Press the emergency stop briefly."""
     bench.uno.press_emergency_stop()
     bench.uno.run_for(0.02)
     bench.uno.press_emergency_stop(False)
@@ -159,8 +159,8 @@ def test_what_waits_when_a_stop_comes_does_not_undo_it(bench, first, stop):
     stop(bench)
     said = bench.wait(2.0)
     assert not bench.valves_on
-    assert said.count("error") == 2, "both lines are answered"
-    assert bench.say("clear").rstrip().endswith("ok"), "one that comes after the stop"
+    assert said.count("error") == 2, "both waiting lines are refused"
+    assert bench.say("clear").rstrip().endswith("ok"), "a clear sent after the stop is accepted"
     assert bench.say("run").rstrip().endswith("ok")
 
 

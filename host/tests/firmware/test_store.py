@@ -1,4 +1,4 @@
-"""The store in EEPROM: power cuts at every byte, bad cells, wear, migration, strangers' bytes."""
+"""The store in EEPROM: power cuts at every write, bad cells, wear, migration, foreign contents."""
 
 import binascii
 import random
@@ -35,7 +35,7 @@ ffi, lib = load(
 
 
 def parameter_set(seed: int) -> bytes:
-    """A valid set that differs from that of any other seed."""
+    """A valid parameter set, different for every seed."""
     values = dict(zip(("period_s", "psi12_deg", "psi13_deg"), PRESETS["baseline"], strict=False))
     names = ("duty_body", "duty_head", "duty_tail", "coupling_per_s", "pressure_psi", "host_timeout_s")
     values |= dict(zip(names, PRESETS["baseline"][3:], strict=True))
@@ -45,7 +45,7 @@ def parameter_set(seed: int) -> bytes:
 
 
 class Bench:
-    """A store with its EEPROM."""
+    """A store and its simulated EEPROM."""
 
     def __init__(self, image: bytes = BLANK) -> None:
         self._bench = ffi.gc(lib.bench_new(image), lib.bench_free)
@@ -99,7 +99,7 @@ class Bench:
 
 
 def furnished() -> bytes:
-    """An EEPROM with the settings and seven presets, one of them saved several times."""
+    """An EEPROM with settings and seven presets, one of them saved twice."""
     bench = Bench()
     assert bench.save_settings(bytes(range(24))) == OK
     for seed, name in enumerate(["alpha", "beta", "gamma", "delta", "epsilon", "zeta", "startup", "alpha"]):
@@ -155,7 +155,7 @@ OPERATIONS = {
 
 @pytest.mark.parametrize("operation", OPERATIONS)
 def test_power_cut_at_every_write(operation):
-    """After a cut at any write, whatever is left in the cell, the old or the new set is there; nothing else changed."""
+    """After a cut at any write, whatever it leaves in the cell, the old or new set is read; all else is intact."""
     act, name, new = OPERATIONS[operation]
     image = furnished()
 
@@ -175,7 +175,7 @@ def test_power_cut_at_every_write(operation):
             after = content(returned)
             assert after.pop(name, None) in (before.get(name), new), (at, leaves)
             assert after == {n: v for n, v in before.items() if n != name}, (at, leaves)
-            # and the next save works, also when the power went again in the middle of the repair
+            # the next save works, too, even if the power fails again in the middle of the repair
             returned.finish()
             assert returned.save("alpha", parameter_set(5)) == OK
             assert Bench(returned.image()).load("alpha") == parameter_set(5)
@@ -195,7 +195,7 @@ def test_power_cut_while_the_second_copy_is_restored():
         assert bench.finish() == -1
         assert Bench(bench.image()).load("beta") == parameter_set(1)
     image = bytearray(repaired.image())
-    image[copies[1] * SLOT + 20] ^= 0x40  # now the other one goes bad
+    image[copies[1] * SLOT + 20] ^= 0x40  # now the other copy goes bad
     assert Bench(bytes(image)).load("beta") == parameter_set(1)
 
 
@@ -233,7 +233,7 @@ def test_a_thousand_saves_are_all_readable_and_wear_evenly():
             assert Bench(bench.image()).load("one") == parameter_set(seed)
     wear = bench.wear()
     marks = [wear[slot * SLOT] for slot in range(SLOTS)]
-    # four of the 21 slots hold the presets that stay; the others share 2,000 copies
+    # four of the 21 slots hold the unchanged presets; the others share 2,000 copies
     assert sorted(marks)[4] >= 0.8 * max(marks)
     assert max(wear) < 3 * 2000 / 17
 
@@ -248,7 +248,7 @@ def test_records_of_the_first_format_are_brought_up_to_date():
     image = (old_record(1, 5, b"walker", old) + BLANK)[:SIZE]
     bench = Bench(image)
     assert bench.load("walker") == old + b"\0\0"
-    bench.finish()  # its second copy is written, in the present format
+    bench.finish()  # writes its second copy, in the current format
     image = bench.image()
     assert image[SLOT : SLOT + 2] == b"\xa5\x02"
     assert Bench(b"\xff" * SLOT + image[SLOT:]).load("walker") == old + b"\0\0"
@@ -272,7 +272,7 @@ def test_records_of_a_later_format_are_forgotten_by_their_name():
 
 
 def test_a_sequence_that_is_used_up_is_said_and_erasing_begins_anew():
-    """No Uno lives that long, but a stranger's EEPROM may say so: nothing is "saved" that cannot be read again."""
+    """A save that could not be read back is refused. (No Uno lives that long, but a foreign EEPROM may say so.)"""
     bench = Bench((old_record(2, 0xFFFFFF00, b"last", parameter_set(1)) + BLANK)[:SIZE])
     assert bench.load("last") == parameter_set(1)
     assert bench.save("next", parameter_set(2)) == EEPROM
@@ -296,7 +296,7 @@ def test_good_checks_do_not_excuse_bad_values():
 @given(st.integers(0, 2**32))
 @settings(max_examples=60, deadline=None)
 def test_any_history_with_cuts_ends_in_old_or_new(seed):
-    """Random saves, deletions and cuts: what is there is always the last finished or the interrupted value."""
+    """After random saves, deletions and cuts, a preset has its last completed or its interrupted value."""
     rng = random.Random(seed)
     bench, known = Bench(), {}
     for _ in range(40):

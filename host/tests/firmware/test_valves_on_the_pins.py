@@ -1,4 +1,4 @@
-"""Whatever comes in, the pins never show both valves of a chamber, nor less than the dead time between them."""
+"""Whatever input arrives, a chamber's two valves are never on together, nor within the dead time of each other."""
 
 import random
 import string
@@ -20,7 +20,7 @@ CHAMBERS = ((4, 5), (6, 7), (8, 9))
 WORDS = ("body", "head", "tail", "positive", "vacuum", "off", "on", "confirm", "baseline", "obstacle")
 TEXTS = (
     *(b"run\n", b"run\n", b"stop\n", b"clear\n", b"!", b"load obstacle\n", b"stream on\n"),
-    *(b"help\n", b"show\n", b"status\n", b"presets\n", b"plot on\n", b"save text\n"),  # deepest in the stack
+    *(b"help\n", b"show\n", b"status\n", b"presets\n", b"plot on\n", b"save text\n"),  # deepest use of the stack
 )
 
 
@@ -46,7 +46,7 @@ def breaks(events, state=None):
 
 
 def random_input(chance: random.Random) -> bytes:
-    """A line that makes sense, half sense or none, or a frame, whole or damaged."""
+    """A valid, partly valid or meaningless line, or a frame, intact or damaged."""
     kind = chance.random()
     if kind < 0.3:
         return f"hold {chance.choice(WORDS[:3])} {chance.choice(WORDS[3:6])}\n".encode()
@@ -101,7 +101,7 @@ def exercise(bench, seconds: float, seed: int) -> None:
         f" {bench.uno.untouched_ram} bytes of stack never touched;"
         f" commands carried out: {dict(sorted(host.done.items()))}"
     )
-    assert strobes == pytest.approx(STROBES_PER_S * (bench.uno.time_s - begin_s), abs=2), "every event was looked at"
+    assert strobes == pytest.approx(STROBES_PER_S * (bench.uno.time_s - begin_s), abs=2), "every event was examined"
     assert found == []
     assert edges > 5 * seconds, "the valves did move"
     assert {"hold", "run", "stop", "clear", "commit", "schedule_start", "load"} <= set(host.done)

@@ -15,7 +15,7 @@ class WildHost:
     def __init__(self, board, chance: random.Random) -> None:
         self._chance = chance
         self._splitter = frames.Splitter()
-        self._sent: dict[int, str] = {}  # of the present session, by number
+        self._sent: dict[int, str] = {}  # commands of the current session, by sequence number
         self._seed = frames.OPEN_SEED
         self.done: Counter[str] = Counter()  # commands that the Uno carried out
         board.send(frames.encode(COMMANDS["version"], 0, (), frames.OPEN_SEED))
@@ -30,7 +30,7 @@ class WildHost:
                 self.done[self._sent.get(report.sequence, "unknown")] += 1
 
     def session(self) -> bytes:
-        """A new session with some commands, now and then a bit of one wrong, text or noise between two."""
+        """A new session with some commands; now and then a frame has a wrong bit, or is followed by text or noise."""
         chance = self._chance
         key = chance.randrange(1, 65536)
         self._seed = frames.session_seed(key)

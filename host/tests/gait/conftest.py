@@ -7,7 +7,7 @@ from bifa.simulate import plant
 
 @pytest.fixture(scope="session")
 def nominal_plant():
-    """The nominal robot, flat."""
+    """The plant (flat parameters) of the nominal robot."""
     return plant(nominal())
 
 

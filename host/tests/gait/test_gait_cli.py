@@ -1,4 +1,4 @@
-"""`bifa optimize` and `bifa gaits` from the outside."""
+"""The commands `bifa optimize` and `bifa gaits`."""
 
 import tomllib
 from dataclasses import replace
@@ -37,7 +37,7 @@ def test_optimize_writes_a_gait_with_its_origin_and_the_figures(tmp_path):
 
 
 def test_pictures_compare_gaits_on_the_robots_of_the_optimums_own_speeds(runs, tmp_path, monkeypatch):
-    """Without those that do not walk with a gait that is known to walk, and by the same steps."""
+    """The pictures leave out robots that do not walk with a gait known to walk, and use the search's metric."""
     unsure = replace(nominal(), covariance=Covariance(("body_area_N_psi",), np.array([[0.5]])))
     known = library.load("robust").gait
     found = search.optimize(unsure, runs, Settings(robust=False, evaluations=24, seed=5, begin=(known,)))

@@ -1,4 +1,4 @@
-"""The paper's three reasons, found again in the numbers; sensitivity and front."""
+"""The paper's three reasons, reproduced in numbers; sensitivity and front."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def test_the_three_reasons_of_the_paper(both):
     # More time for contraction, since it takes longer.
     assert after.contraction_s > 1.5 * after.extension_s
     assert after.gait.duty_body > 0.6
-    # The ends are told to anchor closer to the body's switches.
+    # The ends are commanded to anchor closer to the body's switches.
     assert 0 < after.tail_lead_s < 0.5 * before.tail_lead_s
     assert 0 < after.head_lead_s < 0.5 * before.head_lead_s
     # Pressures do not settle before they are reversed.
@@ -65,7 +65,7 @@ def test_no_scan_leaves_what_a_gait_may_be(runs, nominal_plant):
     edge = replace(ROBUST, duty_head=0.98)
     scans = {scan.name: scan for scan in sensitivity(runs, nominal_plant, [nominal_plant], edge, Metric().quicker(), 3)}
     assert scans["duty_head"].values.max() == scans["duty_head"].room[1] == 1.0
-    assert scans["psi12_deg"].values[2] == ROBUST.psi12_deg + 40.0  # a turn goes on
+    assert scans["psi12_deg"].values[2] == ROBUST.psi12_deg + 40.0  # phases wrap
 
 
 def test_the_front_keeps_what_nothing_beats():
@@ -74,7 +74,7 @@ def test_the_front_keeps_what_nothing_beats():
 
 
 def test_what_a_body_builds_up_is_not_what_its_sensor_says(both):
-    """With a gain of -0.3 a walk that passes was said to lack force."""
+    """With a sensor gain of -0.3, a walk that passes was once reported to lack force."""
     misread = nominal().with_effects({"sensor_calibration": {"gain": -0.3, "offset_psi": 0.0}})
     before, after = (passing(model, BASELINE, tunnel(), Supports()) for model in (nominal(), misread))
     assert after.extension.built_up_N == before.extension.built_up_N > before.extension.needed_N

@@ -1,4 +1,4 @@
-"""The gaits that ship: complete, and as fast as their files say."""
+"""The shipped gaits: complete, and as fast as their files say."""
 
 import numpy as np
 import pytest
@@ -24,11 +24,11 @@ def test_a_gait_walks_as_fast_as_its_file_says(name, runs, nominal_plant):
 
 
 def test_the_fast_gait_is_as_fast_as_required():
-    assert library.load("fast").provenance["predicted_speed_mm_s"] >= 23.4  # which the test above measures
+    assert library.load("fast").provenance["predicted_speed_mm_s"] >= 23.4  # measured by the test above
 
 
 def test_nine_robots_in_ten_reach_the_required_speed_with_the_robust_gait(runs):
-    """On robots that the search never met: more than one in ten below it, beyond what chance makes of 1 %, fails."""
+    """On robots unknown to the search, no more than one in ten may be slower, with a 1 % allowance for chance."""
     entry, robots = library.load("robust"), 256
     draws = spread_of(nominal()).plants(nominal(), robots, seed=2026)
     speeds = distribution(runs, draws, gait_rows([entry.gait]), load_scenario(entry.name).settings.metric)[0]

@@ -1,4 +1,4 @@
-"""The optimisers on a function whose optimum is known: across a wrap, beside a cliff, on a plain of zeros."""
+"""The optimisers on a function whose optimum is known: across a wrap, beside a cliff, on a plateau of zeros."""
 
 import numpy as np
 import pytest
@@ -36,13 +36,13 @@ def test_the_papers_method_learns_from_few_evaluations():
 
 @pytest.mark.slow
 def test_the_papers_method_does_not_take_a_cliff_for_noise():
-    """With the package's own settings the length scale fell to nothing and the search was random: it found 0."""
+    """With the package's default settings the length scale collapsed and the search became random: it found 0."""
     found = METHODS["bo"](hill, WRAPS, 80, 0)
     assert found.best_value > 0.8
 
 
 def two_basins(points):
-    """A wide basin of 0.55 on which most of a population lands, and one of 1, narrower: a tenth of the volume."""
+    """A wide basin of height 0.55, where most of a population lands, and one of height 1 with a tenth of its volume."""
     wide = 0.55 * np.maximum(1 - (((points - 0.3) / 0.5) ** 2).sum(axis=1), 0)
     narrow = np.maximum(1 - (((points - 0.8) / 0.3) ** 2).sum(axis=1), 0)
     return np.maximum(wide, narrow)
@@ -50,7 +50,7 @@ def two_basins(points):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_search_does_not_end_in_the_wider_basin(seed):
-    """On robot 4 differential evolution ended at 10.0 mm/s by one seed and at 18.8 by others."""
+    """On robot 4, differential evolution ended at 10.0 mm/s with one seed and at 18.8 with others."""
     found = METHODS["cma"](two_basins, np.zeros(5, bool), 8000, seed)
     assert found.best_value > 0.99
     assert found.agrees
@@ -63,7 +63,7 @@ def test_an_easy_landscape_takes_fewer_evaluations_than_allowed():
 
 
 def test_runs_that_end_apart_are_not_taken_for_an_answer():
-    """One basin in each corner, each of another height: two runs come to the same only by chance."""
+    """Many basins of different heights: two runs end in the same one only by chance."""
     corners = np.random.default_rng(0).random((40, 5))
     heights = np.linspace(0.4, 1.0, 40)
 
@@ -81,18 +81,18 @@ def test_runs_that_end_apart_are_not_taken_for_an_answer():
 
 
 def test_climbs_begin_at_the_basins_that_were_seen():
-    """A robust search has no sample of its own: it climbs from gaits that the model itself is fast with."""
+    """A robust search draws no sample of its own: it climbs from gaits with which the model itself is fast."""
     recorder = RecordedObjective(two_basins, np.zeros(5, bool))
     recorder(np.array([[0.25] * 5, [0.7] * 5, [0.71] * 5]))
     found = climb_basins(recorder, np.zeros(5, bool), 600, 0)
     assert found.best_value > 0.99
     assert found.ends.values[0] == found.best_value
     np.testing.assert_array_equal(found.ends.points[0], found.best_point)
-    assert len(found.values) < 600 + 5 * 12, "a generation of five runs more at most"
+    assert len(found.values) < 600 + 5 * 12, "at most one more generation of five runs"
 
 
 def test_a_narrow_basin_is_climbed_from_a_point_known_to_be_near_its_top():
-    """A second family of gaits, 5 % faster on some robots, was found by one seed in four."""
+    """Without known points, a family of gaits 5 % faster on some robots was found with one seed in four only."""
 
     def narrow(points):
         away = np.abs(points - 0.8).max(axis=1)

@@ -1,4 +1,4 @@
-"""The rules of the speed: settled, periodic, no slip; and the passage of the tunnel."""
+"""The rules by which a speed counts: settled, periodic, no slip; and the passage of the tunnel."""
 
 import numpy as np
 import pytest
@@ -40,13 +40,13 @@ def test_only_what_keeps_the_rules_counts(metric, advance_mm, slip_um, counted_m
 
 
 def test_a_robot_that_cannot_be_simulated_does_not_walk():
-    """One among many would otherwise make every quantile and mean of a gait's robots NaN, and no gait the best."""
+    """Such a robot counts as 0 mm/s; NaN would spread to quantiles and means over robots, and no gait would be best."""
     judged = Judged(np.array([np.nan, 5.0, -5.0]), np.zeros(3, dtype=bool))
     assert judged.counted_mm_s.tolist() == [0.0, 5.0, 0.0]
 
 
 def test_draws_may_slip_and_their_cycles_differ_and_the_mean_counts():
-    """On a supply that ripples every cycle is another; a robot that falls differs by more."""
+    """With a rippling supply no two cycles are equal; those of a robot that falls differ by more."""
     rippling = progress([50] * 7 + [46, 54, 50], 30)
     assert Metric().judge(rippling).refused
     assert Metric().of_draws().judge(rippling).counted_mm_s == pytest.approx([25.0])
@@ -54,7 +54,7 @@ def test_draws_may_slip_and_their_cycles_differ_and_the_mean_counts():
 
 
 def test_what_never_settles_is_judged_in_full_by_the_second_half_of_what_is_walked():
-    """A gait that a tether lets fall after sixteen cycles was sought at 23.0 mm/s, and walked 20.5."""
+    """A gait that falls after sixteen cycles because of a tether was expected at 23.0 mm/s and walked at 20.5."""
     falling = progress([50] * 16 + [44] * 8)
     whole = Metric().of_unlike_cycles()
     for metric in (whole.in_full(), whole.of_draws().in_full(), whole.finer(), whole.quicker()):
@@ -65,7 +65,7 @@ def test_what_never_settles_is_judged_in_full_by_the_second_half_of_what_is_walk
 
 
 def test_passage_is_way_over_time_with_the_last_cycle_in_part():
-    way_mm = 1e3 * passed_at_m(tunnel()) + 60.0  # head, body extended, when the tail is behind
+    way_mm = 1e3 * passed_at_m(tunnel()) + 60.0  # of the head, with the body extended, when the tail is through
     step = way_mm / 3.5
     judged = Passage(cycles=5).judge(progress([step] * 5))
     assert judged.counted_mm_s == pytest.approx([way_mm / (3.5 * 2.0)])
@@ -79,6 +79,6 @@ def test_the_papers_observation_the_slow_gait_passes_the_tunnel_and_the_fast_one
     slow, fast = passage.judge(speeds(nominal_plant, rows, passage.cycles, terrain=passage.terrain)).counted_mm_s
     assert slow > 5.0
     assert fast == 0.0
-    # The search sees the tunnel too.
+    # The search takes the tunnel into account too.
     again = runs.judged([nominal_plant], np.zeros(2, int), rows, passage).counted_mm_s
     np.testing.assert_allclose(again, [slow, fast])

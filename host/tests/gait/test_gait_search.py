@@ -1,4 +1,4 @@
-"""The search as a whole: what it promises about the gait that it hands out."""
+"""The search as a whole: its guarantees about the gait that it returns."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ SPACE = Settings().space
 
 
 def verified(model, runs, points, spread, values=None):
-    """The finalist of these points, and its speed."""
+    """The verified finalist among these points, and its speed."""
     found = Evaluated(points, np.ones(len(points)) if values is None else values)
     return best_of_finalists(SearchRun(model, runs, spread_of(model, spread), Settings()), found, found)
 
@@ -55,11 +55,11 @@ def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nomin
     exact = np.minimum(speeds[:, 1], alone)  # the second smallest of 32
     best = int(np.argmax(exact))
     assert robust[best] == pytest.approx(exact[best])
-    assert (robust >= exact - 1e-9).all()  # given up early: an upper bound ...
+    assert (robust >= exact - 1e-9).all()  # abandoned early: an upper bound ...
     assert (robust[robust > exact + 1e-9] < robust.max()).all()  # ... that does not win
     before = runs.count
     again = objective(points[best][None])
-    assert runs.count - before < 1 + len(draws), "the hardest robots are known now, and the easy ones are not met"
+    assert runs.count - before < 1 + len(draws), "the hardest robots are known now, and the easy ones are skipped"
     assert again == pytest.approx(exact[best], rel=0.01)
 
 
@@ -69,7 +69,7 @@ def test_a_gait_that_walks_by_a_hair_of_its_period_does_not_count_where_periods_
     point = SPACE.point(library.load("fast").gait)[None]
     copies = np.concatenate([SPACE.slower(point, share) for share in np.arange(0.02, -0.03, -0.001)])
     walks = exact(copies) > 20.0
-    last = int(np.argmin(walks)) - 1  # one step of 0.1 % before the first copy that does not
+    last = int(np.argmin(walks)) - 1  # one step of 0.1 % before the first copy that does not walk
     assert last >= 10
     assert jittered(copies[last][None])[0] < 0.5 * exact(copies[last][None])[0]
     well = copies[last - 8][None]  # 0.8 % slower
@@ -84,8 +84,8 @@ def test_a_robot_that_cannot_walk_is_said_so(runs):
 
 
 def test_where_the_fastest_gait_falls_the_climb_begins_at_its_slower_copies(runs):
-    """Most of the fast basin is beyond the cliff of some robots, where a robust objective is 0 and nothing leads up:
-    of a robot whose valves choke a search ended at 8.5 mm/s in place of 18."""
+    """Most of the fast basin lies beyond the cliff of some robots, where a robust objective is 0 and has no slope: for
+    a robot whose valves choke, a search ended at 8.5 mm/s in place of 18."""
     search = SearchRun(nominal(), runs, spread_of(nominal(), 0.02), Settings())
     fast = SPACE.point(library.load("fast").gait)[None]
     assert search.objective(EXPLORE, 0)(fast)[0] < 2.0
@@ -94,7 +94,7 @@ def test_where_the_fastest_gait_falls_the_climb_begins_at_its_slower_copies(runs
 
 
 def test_a_gait_that_never_is_periodic_to_a_thousandth_counts_in_a_robust_search(runs):
-    """A tether is longer by every cycle, and the feet slip by microns: a gait that had walked at 23.2 mm/s counted 0,
+    """A tether grows with every cycle, and the feet slip by microns: a gait that had walked at 23.2 mm/s counted as 0,
     and the search ended at 22.7."""
     dragging = nominal().with_effects({"tether_drag": {"drag_N_m": 1.0}})
     walked = Gait(2.68, 213.8, 349.96, 0.6433, 0.4655, 0.4655)
@@ -119,7 +119,7 @@ def test_a_search_ends_no_slower_than_the_gaits_that_it_begins_from(runs, robust
 
 @pytest.mark.slow
 def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
-    """With a spread of 1 % a search on few robots ended at gaits that fail one robot in ten: 10th percentile 0."""
+    """With a spread of 1 %, a search on few robots ended at gaits that fail on one robot in ten: 10th percentile 0."""
     sloping = nominal().with_effects({"inclination": {"angle_deg": 5.0}})
     brittle = SPACE.slower(SPACE.point(library.load("robust").gait)[None], -0.04)
     gait, speed = verified(sloping, runs, brittle, 0.01)
@@ -132,8 +132,8 @@ def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
 
 @pytest.mark.parametrize("elsewhere", [["robust"], []], ids=["the others are asked", "slower copies are"])
 def test_where_all_gaits_of_one_place_fall(runs, monkeypatch, elsewhere):
-    """Of a viscoelastic robot one seed in four found no gait: all finalists lay beyond the same cliff, where the robot
-    creeps at best. With a tether drag one seed in five had none elsewhere either."""
+    """For a viscoelastic robot one seed in four found no gait: all finalists lay beyond the same cliff, where the robot
+    creeps at best. With tether drag, one seed in five had no finalist elsewhere either."""
     fallen = SPACE.slower(SPACE.point(library.load("fast").gait)[None], -0.02)
     near = 0.0035 * np.array([[0.0, row, column, 0.0, 0.0] for row in range(8) for column in range(9)])
     points = np.vstack([fallen + near, *(SPACE.point(library.load(name).gait) for name in elsewhere)])
@@ -143,7 +143,7 @@ def test_where_all_gaits_of_one_place_fall(runs, monkeypatch, elsewhere):
 
 
 def test_a_gait_of_which_no_cycle_is_like_the_one_before_counts_where_none_can_be(runs, monkeypatch):
-    """On a supply that ripples a search kept to the few gaits whose period the ripple divides: 18.5 mm/s, not 22.8."""
+    """With a rippling supply, a search kept to the few multiples of the ripple's period: 18.5 mm/s, not 22.8."""
     rippling = nominal().with_effects({"regulator_ripple": {}})
     found = Evaluated(SPACE.slower(SPACE.point(library.load("robust").gait)[None], 0.02), np.array([22.0]))
     monkeypatch.setitem(METHODS, "cma", lambda *_: found)
@@ -154,7 +154,7 @@ def test_a_gait_of_which_no_cycle_is_like_the_one_before_counts_where_none_can_b
 
 
 def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(runs):
-    """Nearly all robots were as fast as the model there, which was not walking either."""
+    """It is rejected although nearly all robots are as fast as the model with it, which does not walk either."""
     fallen = SPACE.slower(SPACE.point(library.load("fast").gait)[None], -0.02)
     assert distribution(runs, [plant(nominal())], gait_rows(SPACE.gaits(fallen)), Metric())[0, 0] < 2.0
     _, speed = verified(nominal(), runs, fallen, 0.001)
@@ -162,7 +162,7 @@ def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(
 
 
 def test_a_finalist_that_keeps_less_than_the_best_promised_gives_way_to_one_that_keeps_it(runs, monkeypatch):
-    """Of one supply that sags 8.5 % of 512 robots were just as fast as promised, and 10 % of 1,024 were not."""
+    """With a sagging supply, the 8.5 % quantile of 512 robots just kept the promise, the 10 % one of 1,024 did not."""
     point = SPACE.point(library.load("robust").gait)
     lucky = np.vstack([point, SPACE.slower(point[None], 0.03)])
     fastest: list[float] = []
@@ -180,7 +180,7 @@ def test_a_finalist_that_keeps_less_than_the_best_promised_gives_way_to_one_that
 
 @pytest.mark.slow
 def test_where_no_gait_suits_nine_robots_in_ten_the_best_is_given(runs):
-    """Half the robots of a 20 % spread cannot walk at such speeds: no error, and not just any gait."""
+    """If half the robots of a 20 % spread cannot walk so fast, there is no error and no arbitrary gait."""
     points = np.array([SPACE.point(library.load(name).gait) for name in ("fast", "robust")])
     gait, speed = verified(nominal(), runs, points, 0.2)
     assert speed > 20.0
@@ -216,7 +216,7 @@ def test_an_unknown_method_is_refused(runs):
 @pytest.mark.soak
 @pytest.mark.parametrize("robust", [False, True])
 def test_five_seeds_agree_and_reach_what_is_required(runs, robust):
-    """23.4 mm/s on the model, 21.8 mm/s for nine robots in ten at 2 %; the seeds within 1 %."""
+    """23.4 mm/s on the model, 21.8 mm/s for nine robots in ten at a spread of 2 %; the seeds agree within 1 %."""
     optima = [optimize(nominal(), runs, Settings(robust=robust, seed=seed)) for seed in range(5)]
     speeds = np.array([o.quantile_mm_s if robust else o.nominal_mm_s for o in optima])
     assert speeds.min() >= (21.8 if robust else 23.4)
@@ -238,8 +238,8 @@ def test_no_scheduler_and_no_workers_are_named():
 
 
 def test_robots_that_do_not_walk_with_a_gait_that_is_known_to_walk_are_none_of_those_it_may_be(runs):
-    """Stribeck friction, 830: by the covariance alone a fifth stood still with gaits that had been walked, and the
-    search at the edge ended at the baseline."""
+    """Robot stribeck, 830: a fifth of the robots drawn from the covariance alone stood still with gaits that had been
+    walked, and the search at the edge ended at the baseline."""
     wide = replace(spread_of(nominal(), 0.05), is_guess=False)
 
     def slowest(settings):

@@ -1,4 +1,4 @@
-"""The box that is searched, and the map to the unit cube."""
+"""The search box and its map to the unit cube."""
 
 from dataclasses import replace
 
@@ -36,8 +36,8 @@ def test_of_a_gait_outside_the_nearest_is_taken():
 
 
 def switches_s(gait):
-    """When head and tail turn to vacuum, in the half period around the body's turn to it, and for how long body and
-    ends stay there and the body is under pressure."""
+    """Times when head and tail switch to vacuum, within half a period of the body's switch, and how long the body is at
+    vacuum and under pressure and the ends are at vacuum."""
     turns = [-((ahead / 360.0 + 0.5) % 1.0 - 0.5) * gait.period_s for ahead in (gait.psi12_deg, gait.psi13_deg)]
     at_vacuum = gait.duty_body * gait.period_s
     return np.array([*turns, at_vacuum, gait.period_s - at_vacuum, gait.duty_head * gait.period_s])

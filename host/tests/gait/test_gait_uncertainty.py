@@ -1,4 +1,4 @@
-"""Draws of the robot: the stated spread, a fit's covariance, bounds."""
+"""Robots drawn from the stated spread or from a fit's covariance, within the bounds."""
 
 from dataclasses import replace
 
@@ -59,12 +59,12 @@ def test_a_covariance_that_is_none_is_refused():
 
 
 def forces(plants, at=0.5):
-    """K in N halfway along each plant's table of the body's spring."""
+    """K in N at a share `at` along each plant's table of the body's spring."""
     return np.array([plant.body_curve[1 + int(at * (len(plant.body_curve) - 1)), 0] for plant in plants])
 
 
 def test_the_springs_curves_are_drawn_with_the_parameters():
-    """A softer spring and a smaller area push alike: apart they would say much more than the data leave open."""
+    """A softer spring and a smaller area act alike: drawn independently, they would vary more than the data allow."""
     names = ("body_area_N_psi", "body_stiffness.0")  # whose value at z = 0 is K's, halfway along the range
     sd = np.array([0.05, 0.4])
     matrix = np.outer(sd, sd) * np.array([[1.0, 0.9], [0.9, 1.0]])

@@ -23,11 +23,11 @@ def values(model, name, count=512):
 
 
 def test_what_differs_from_run_to_run_is_drawn_anew_for_each_walk():
-    """Robot 4, seed 2: 18.79 mm/s were predicted and 1.41 walked; the fit's covariance alone knows of no such thing."""
+    """Robot 4, seed 2: 18.79 mm/s were predicted and 1.41 measured; the fit's covariance alone cannot explain it."""
     model = known(Scatter(friction=0.02))
     static, kinetic = (values(model, name) / nominal()[name] for name in ("mu_s", "mu_k"))
     assert np.std(static) == pytest.approx(0.02, rel=0.1)
-    assert np.std(kinetic / static) < 1e-4, "both together"
+    assert np.std(kinetic / static) < 1e-4, "both scale together"
     assert np.ptp(values(model, "head_mass_kg")) == 0.0
 
 
@@ -92,7 +92,7 @@ def test_cycles_of_a_slow_clock_are_longer():
 
 
 def test_what_is_predicted_is_what_the_uno_does_which_vents_between_the_supplies():
-    """At the edge 4 ms decide: with this gait the robot walks because of the vent."""
+    """At the edge 4 ms decide: with this gait the robot walks only because of the venting."""
     edge = library.load("fast").gait
     edge = replace(edge, period_s=0.999 * edge.period_s)
     as_the_uno, without = known(Scatter(dead_time_s=0.004)), known(Scatter())
@@ -106,13 +106,13 @@ def test_what_is_predicted_is_what_the_uno_does_which_vents_between_the_supplies
 
 
 def test_at_a_cliff_the_ticks_of_the_uno_decide_which_nobody_foresees():
-    """Friction by direction, 500: with 0.30 % off the period no run of four walked, with 0.33 % six of six did."""
+    """Robot friction_direction, 500: no run of four walked with the period off by 0.30 %, six of six did at 0.33 %."""
     edge = library.load("fast").gait
     certain, open_ = (known(Scatter(switch_error_s=s)) for s in (0.0, 0.0005))
     assert predict_speed(certain, spread_of(certain), edge, draws=64).walks_probability > 0.98
     assert 0.3 < predict_speed(open_, spread_of(open_), edge, draws=64).walks_probability < 0.9
     baseline = [predict_speed(m, spread_of(m), BASELINE, draws=64).interval_90_mm_s for m in (certain, open_)]
-    assert baseline[1] == pytest.approx(baseline[0], abs=0.01), "and elsewhere they do not"
+    assert baseline[1] == pytest.approx(baseline[0], abs=0.01), "elsewhere they do not"
 
 
 def test_how_the_uno_keeps_time_is_known_whatever_the_spread():
@@ -122,7 +122,7 @@ def test_how_the_uno_keeps_time_is_known_whatever_the_spread():
 
 
 def test_the_search_knows_the_clock(runs, nominal_plant):
-    """Of a gait sought without it 0.95 of the robots were to walk, and 0.79 did on a clock that was 0.23 % fast."""
+    """For a gait sought without it, 0.95 of the robots were predicted to walk; on a clock 0.23 % fast, 0.79 did."""
     judged = (
         runs.judged([nominal_plant], np.zeros(1, int), gait_rows([BASELINE]), Metric(clock=c)) for c in (1.0, 0.9)
     )
@@ -142,7 +142,7 @@ def test_robots_that_fall_behind_count_for_the_probability_and_not_for_the_inter
 
 @pytest.mark.parametrize("falling", [0.02, 0.4, 0.57, 0.95])
 def test_the_interval_is_that_of_the_robots_that_walk_even_where_most_fall(falling):
-    """Friction by direction, 300: 1.00 to 23.80 mm/s with probability 0.43, from the median of the fallen."""
+    """Robot friction_direction, 300: the median of the fallen led to 1.00 to 23.80 mm/s with probability 0.43."""
     draw = np.random.default_rng(3)
     fall = int(falling * 1000)
     speeds = np.concatenate([draw.normal(1.1, 0.1, fall), draw.normal(23.8, 0.02, 1000 - fall)])
@@ -155,4 +155,4 @@ def test_the_interval_is_that_of_the_robots_that_walk_even_where_most_fall(falli
 def test_robots_that_differ_much_but_do_not_fall_all_walk():
     speeds = np.random.default_rng(1).normal(20.0, 1.5, 256)
     assert Prediction(speeds, 5).walks.sum() >= 254
-    assert Prediction(np.array([*[20.0] * 255, 30.0]), 5).walks.all(), "one that is faster is no measure"
+    assert Prediction(np.array([*[20.0] * 255, 30.0]), 5).walks.all(), "a single faster one is no reference"

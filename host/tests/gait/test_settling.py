@@ -1,4 +1,4 @@
-"""One rule for when a walk has settled, simulated or measured, and the measured speed of what has."""
+"""The rule for when a walk, simulated or measured, has settled, and the measured speed of its settled cycles."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_the_cameras_noise_does_not_unsettle_a_walk():
         assert 1 <= found.begins <= 4
         untold = settling(np.diff(places))
         late += not untold.is_settled or untold.begins > 4
-    assert late > 190  # told nothing of the noise
+    assert late > 190  # without knowing the noise
 
 
 def test_what_drifts_or_alternates_does_not_settle():
@@ -51,7 +51,7 @@ def test_a_constant_end_is_found_whatever_went_before(transient, settled):
 
 
 def walked(advances_mm, period_s=2.0):
-    """A record that moves evenly in every cycle."""
+    """A record that advances evenly within every cycle."""
     time_s = np.arange(0.0, len(advances_mm) * period_s + 0.005, 0.01)
     ends = np.concatenate([[0.0], np.cumsum(advances_mm)])
     return time_s, np.interp(time_s, period_s * np.arange(len(ends)), ends)
@@ -66,7 +66,7 @@ def test_a_steady_walk_has_its_speed_and_no_spread():
 
 
 def test_the_cycles_in_which_it_settles_do_not_count():
-    """Until now two cycles were left out, whatever the walk: this one read 31.4 mm/s."""
+    """Only settled cycles count; with the former rule of leaving out two, this walk had 31.4 mm/s."""
     speed = measured_speed(*walked([90, 80, 75, 70, 65, 62, 60.8, *[50.0] * 6]), 2.0)
     assert speed.mean_mm_s == pytest.approx(25.0)
     assert (speed.begins, speed.settled_cycles) == (7, 6)
@@ -89,7 +89,7 @@ def test_what_never_settles_says_so_and_has_the_speed_of_its_second_half():
 
 
 def test_a_robot_that_stands_still_at_first_walks_all_the_same():
-    """The demo's seed 8: after two such cycles it was said to stand still, at 0.7 mm/s where 20.7 were predicted."""
+    """In the demo, seed 8 was reported to stand still after two such cycles, at 0.7 mm/s where 20.7 were predicted."""
     speed = measured_speed(*walked([19.0, 2.2, 97.0, *[58.5] * 5], 2.83), 2.83)
     assert (speed.walking, speed.begins) == (Walking.SETTLED, 3)
     assert speed.mean_mm_s == pytest.approx(20.67, abs=0.01)

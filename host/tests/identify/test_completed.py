@@ -1,4 +1,4 @@
-"""What a completed model knows and says of itself: uncertainty, name, provenance, and the source of each value."""
+"""What a completed model states about itself: uncertainty, name, provenance, and the source of each value."""
 
 from dataclasses import replace
 

@@ -1,6 +1,6 @@
-"""Do 90 % intervals contain the truth nine times in ten? On data of the virtual robot, whose equations are the paper's
-but whose code is not the model's. A set is a day at the bench: a specimen of its own, with its own stiffness curves,
-parameters some percent off the nominal ones where the fit starts, and noise.
+"""Whether 90 % intervals contain the truth nine times in ten, on data of the virtual robot, which has the paper's
+equations in code independent of the model's. Each set is a day at the bench with another specimen: its own stiffness
+curves, parameters some percent off the nominal ones, from which the fit starts, and noise.
 
 `pytest -s` prints the tables that docs/characterisation.md shows.
 """
@@ -61,8 +61,8 @@ def measured(plans: Iterable[Plan], seed: int) -> tuple[Dataset, dict[str, float
 
 
 def coverage(plans: Iterable[Plan], seeds: Iterable[int]) -> pd.DataFrame:
-    """A row for each parameter of each set: how far the estimate is from the truth, in its own standard deviations, and
-    whether its 90 % interval contains it. In every set the RMS error of every channel is near the noise floor."""
+    """A row for each parameter of each set: the estimate's error in its own standard deviations, and whether its 90 %
+    interval contains the truth. Asserts that the RMS error of every channel of every set is near the noise floor."""
     rows, errors = [], []
     for seed in seeds:
         dataset, truth = measured(plans, seed)
@@ -79,16 +79,17 @@ def coverage(plans: Iterable[Plan], seeds: Iterable[int]) -> pd.DataFrame:
 
 
 def assert_nine_in_ten(found: pd.DataFrame) -> None:
-    """What chance makes of 90 % intervals that are right, once in a thousand on either side: of all of them together,
-    and once in ten thousand too few of one parameter."""
-    low, high = binom.ppf((1e-3, 1 - 1e-3), len(found), 0.9)
-    assert low <= found.covered.sum() <= high
+    """Assert at least the coverage that correct 90 % intervals have by chance: for all together, too few once in a
+    thousand; for each parameter alone, once in ten thousand. The wider of two estimates is taken, so errors scatter by
+    less than the standard deviations, but not by much less."""
+    assert found.covered.sum() >= binom.ppf(1e-3, len(found), 0.9)
     for name, hits in found.groupby("parameter").covered:
         assert hits.sum() >= binom.ppf(1e-4, len(hits), 0.9), name
+    assert found.error_sd.std() > 0.7
 
 
 def test_intervals_contain_the_truth_nine_times_in_ten():
-    """The large actuator alone."""
+    """With the large actuator alone, 90 % intervals contain the truth nine times in ten."""
     found = coverage(LARGE, range(SETS))
     names = ("damping_Ns_m", "area_N_psi", "alpha_n_per_s", "alpha_s_per_s")
     assert set(found.parameter) == {f"body_{name}" for name in names}

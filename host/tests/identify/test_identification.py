@@ -40,7 +40,7 @@ def truth_of(lab: IndependentLab) -> dict[str, float]:
 
 
 def covered(found: Identification, lab: IndependentLab) -> dict[str, bool]:
-    """Of each parameter, whether its interval contains the truth."""
+    """Whether each parameter's interval contains the truth."""
     return {
         name: found.intervals[name].lower <= at <= found.intervals[name].upper for name, at in truth_of(lab).items()
     }
@@ -65,7 +65,7 @@ def test_the_parameters_of_an_independent_robot_come_back(found, lab):
 
 @pytest.mark.soak
 def test_intervals_of_the_independent_robot_contain_the_truth():
-    """A curve that the model can only approximate, and coloured noise: nine in ten, less what chance makes."""
+    """Nine in ten do, allowing for chance, with a curve that the model can only approximate and coloured noise."""
     labs = [IndependentLab().with_seed(seed) for seed in range(11, 19)]
     hits = pd.DataFrame([covered(identify(small_session(lab)), lab) for lab in labs])
     share = hits.to_numpy().mean()
@@ -82,9 +82,9 @@ def test_the_error_is_within_a_tenth_of_the_noise_floor(found):
 def test_what_no_experiment_tells_is_said_with_what_would(found):
     named = {missing.name for missing in found.open}
     for name in ("small_mass_kg", "wall_stiffness_N_m", "wall_damping_Ns_m"):
-        assert name in named or found.intervals[name].sd < 0.7 * PRIOR_SD[name], "told, or said to be open"
+        assert name in named or found.intervals[name].sd < 0.7 * PRIOR_SD[name], "determined, or reported as open"
     assert "head_mass_kg" not in named  # the lab knows it
-    assert all(missing.value == found.model[missing.name] for missing in found.open)  # the curves are told
+    assert all(missing.value == found.model[missing.name] for missing in found.open)  # the curves are determined
     assert all(missing.needs for missing in found.open)
     assert all(any(missing.needs in line for line in remarks(found)) for missing in found.open)
 
@@ -139,7 +139,7 @@ def test_a_model_that_does_not_fit_says_so(found):
 
 
 def test_too_little_data_says_what_cannot_be_had(lab):
-    """Static loading of the large actuator alone: its curve and its area, and nothing else."""
+    """Static loading of the large actuator alone determines its curve and its area, and nothing else."""
     trials = tuple(
         replace(lab.static("large", p, rate_mm_s=4.0, repeat=r), file=f"{p:g}_{r}.csv")
         for p in (0.0, 8.0)

@@ -1,4 +1,4 @@
-"""What repeats share, and no noise."""
+"""The scatter of a model: the residual that repeats share, without the noise, and its other parts."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -31,7 +31,7 @@ def test_the_scatter_says_how_the_uno_keeps_time():
 
 
 def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():
-    """The next walk is at a place of another session that nobody knows."""
+    """The next walk is at an unknown position in another session."""
     day = np.linspace(-1.0, 1.0, 65)[None]
     learnt = (Correction("vacuum_of_the_day", 0.3 * day), Correction("area_of_the_day", 0.02 * day))
     structure = SimpleNamespace(corrections=lambda theta: learnt, system=SimpleNamespace(model=nominal()))
@@ -42,7 +42,7 @@ def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():
 
 
 def test_few_gaits_tell_less_of_the_next_than_many():
-    """Of three gaits that were 1 % off the next is within 2.35 %, Student's t of three, in nine of ten cases."""
+    """After three gaits that were 1 % off, the next is within 2.35 % in nine of ten cases (Student's t of three)."""
     assert 1.645 * of_few([1e-4] * 3) == pytest.approx(0.0235, rel=1e-2)
     assert of_few([1e-4] * 1000) == pytest.approx(0.01, rel=1e-2)
     assert of_few([-1e-6]) == of_few([]) == 0.0

@@ -30,7 +30,7 @@ def test_the_curve_of_an_independent_actuator_comes_back(actuator):
     fit = fit_static(bench(lab, actuator), actuator)
     x = np.linspace(*fit.stiffness.covered_m, 200)
     error = fit.stiffness.force(x) - [truth.spring(v) for v in x]
-    assert np.abs(error).max() < 0.1  # N, of a noise of 0.12 N a sample
+    assert np.abs(error).max() < 0.1  # N, with a noise of 0.12 N per sample
     assert fit.stiffness.residual_N == pytest.approx(lab.force_noise, rel=0.1)
     assert fit.area_N_psi.value == pytest.approx(truth.area, rel=5e-4)
     assert fit.stiffness.unstable_m() == pytest.approx(truth.unstable, abs=2e-5)
@@ -58,7 +58,7 @@ def test_hysteresis_is_averaged_out_and_its_size_reported(half_width_N):
 
 
 def force_sd(fit, x):
-    """Standard deviation of K(x) [N], also where the curve goes on straight."""
+    """Standard deviation of K(x) [N], also on the straight continuation of the curve."""
     ways = [replace(fit, coefficients=shape).force(x) for shape in fit.shapes()[0]]
     return np.sqrt(np.sum(np.square(ways), axis=0))
 
@@ -86,7 +86,7 @@ def test_shapes_are_a_unit_coordinate_of_the_posterior():
     fit = fit_static(bench(IndependentLab().with_seed(1), "large", (0.0,), 2), "large").stiffness
     shapes, told = fit.shapes()
     assert shapes.T @ shapes == pytest.approx(fit.covariance, rel=1e-6, abs=1e-9)
-    assert 8 <= told.sum() < 16  # the continuation is not told by static loading
+    assert 8 <= told.sum() < 16  # static loading does not determine the continuation
     for kind in (told, ~told):
         assert (np.diff(np.linalg.norm(shapes[kind], axis=1)) <= 1e-12).all()
 

@@ -1,8 +1,8 @@
-"""A heated block as a plain function, vectorised: what a newcomer's own system looks like.
+"""A heated block as a plain, vectorised function, as a new user would write it.
 
-    tau T' = gain (power, clipped) - T - loss T |T|, seen by a sensor that is late
+    tau T' = gain (power, offset and clipped) - T, seen by a sensor that lags
 
-Its effects are written down in two ways: limits, and their inverses.
+The saturation is parametrised in two ways: by its limit, and by the inverse of the limit.
 """
 
 import numpy as np
@@ -53,12 +53,12 @@ def bare(record, theta):
 
 
 def modelled(simulate, *parameters, **told):
-    """The block as `simulate` has it, with more `parameters`; without effects if none are told."""
+    """The block as modelled by `simulate`, with more `parameters`; without effects unless they are passed."""
     return lacuna.System(simulate, (*PARAMETERS, *parameters), outputs="temperature_K", **told)
 
 
 def said_of(records, given=None):
-    """What is said of records before a search. Raises MisuseError."""
+    """Warnings about records before a search. Raises MisuseError."""
     return check(with_records(given or system(), records))
 
 
@@ -69,7 +69,7 @@ def power(kind, size, time_s=TIME_S):
 
 
 def measured(power_W, seed, **hidden):
-    """Temperature of a block with `hidden` effects (full names, dots as two underscores), measured with noise."""
+    """Temperature of a block with `hidden` effects (full names, two underscores for each dot), measured with noise."""
     draw = np.random.default_rng(seed)
     theta = {"gain_K_W": 0.9, "tau_s": 15.0} | {name.replace("__", "."): value for name, value in hidden.items()}
     known = system()
@@ -79,7 +79,7 @@ def measured(power_W, seed, **hidden):
 
 
 def residuals_of(records, names):
-    """What a block leaves of records, by the values of the parameters `names`: a function for SciPy's fits."""
+    """Residuals of records as a function of the values of the parameters `names`, for SciPy's fits."""
 
     def residuals(values):
         theta = Values(system().values({}) | dict(zip(names, values, strict=True)))

@@ -1,4 +1,4 @@
-"""What a verdict rests on: fits that were not led astray, and explanations that were begun in more than one place."""
+"""What a verdict rests on: fits in the right basin, and explanations fitted from more than one start."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from lacuna.estimation.structure import Structure
 
 @pytest.fixture
 def case():
-    """The toy; one of its conditions is never fitted."""
+    """The toy system with one condition that is never fitted."""
     system = hide({}, seed=31)
     first = system.trials[0]
     return case_of(system, [(first.experiment, first.condition)])
@@ -24,7 +24,7 @@ def case():
 
 @pytest.fixture
 def right(case):
-    """The base model, fitted."""
+    """The fitted base model."""
     return case.judge(case.fit_base(1))
 
 
@@ -41,7 +41,7 @@ def test_a_fit_led_astray_by_plain_least_squares_is_not_what_a_verdict_rests_on(
 
 
 def test_what_a_better_explanation_takes_away_matters_whatever_repeats_share(case, right, monkeypatch):
-    """A tenth of the floor, RMS, of the noise alone is no more than is relevant."""
+    """An explanation dominates another only if it reduces the RMS residual by a relevant amount."""
     a_little, much = (case.judge(astray_by(right.fitted, by)) for by in (0.003, 0.3))
     monkeypatch.setattr(Case, "converged", lambda self, candidate: candidate.fitted)
     assert not case.dominated(right, much)
@@ -85,7 +85,7 @@ def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case
 @pytest.mark.slow
 def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case, right):
     found = search(case, case.judge(astray_by(right.fitted, 0.3)), enough=case.suffices, workers=NOBODY)
-    assert found.base.cost < right.cost + 1e-3 * right.cost, "as far as such a refit goes"
+    assert found.base.cost < right.cost + 1e-3 * right.cost, "to the accuracy of such a refit"
     assert case.suffices(found.base)
 
 
@@ -103,7 +103,7 @@ def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
     [((0.3, 0.0), (0.0, 0.0), True), ((0.1, 0.1), (0.5, 0.1), False), ((0.1, 0.1), (0.5, 0.3), True)],
 )
 def test_what_has_to_be_foreseen_counts_only_where_it_is_so_of_every_pair(monkeypatch, known, ahead, exceeds):
-    """Of a few runs, one pair of fits may differ so by chance."""
+    """With factors at their means, an excess must show in every pair of fits: with few runs, one may by chance."""
     pairs = [([0], ["other"]), ([1], ["other"])]
     monkeypatch.setattr(case_module, "predictive", lambda fitted: ("ahead", fitted))
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""Systems on which the engine's logic was once wrong, rewritten with invented numbers: each says what is true."""
+"""Regression tests: systems on which the engine once decided wrongly, with invented numbers."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_rivals_that_are_the_same_mechanism_are_named_as_a_group():
     (named,) = found.effects
     assert {named.name, *named.confusable_with} == {"square_0", "square_1", "square_2"}
     assert named.probability > 0.99
-    assert found.theta[f"{named.name}.per"] == named.parameters["per"], "one fit is told"
+    assert found.theta[f"{named.name}.per"] == named.parameters["per"], "both are from the same fit"
 
 
 def test_nothing_is_named_that_predicts_what_chose_nothing_worse():
@@ -43,11 +43,11 @@ def test_nothing_is_named_that_predicts_what_chose_nothing_worse():
     system = lacuna.System(simulate, GAIN, [Effect("offset", Parameter("y", "1", 1.0, -5.0, 5.0))])
     found = lacuna.diagnose(system, records, progress=False)
     assert (found.verdict, found.effects) == ("unexplained", ())
-    assert "those that chose nothing (record 5, record 10) worse than without" in found.warnings[0]
+    assert "the test records (record 5, record 10) get worse" in found.warnings[0]
 
 
 def test_what_is_in_every_set_of_weight_is_named_however_little_is_closed_by_the_rest():
-    """a, b and c are true, besides something that nothing explains; d, which is false, is much like b + c/2."""
+    """The data contain a, b, c and a term that no effect explains; d is absent, but much like b + c/2."""
     t, draw, records = np.linspace(0, 20, 300), np.random.default_rng(0), []
 
     def simulate(record, theta):
@@ -83,8 +83,8 @@ def test_an_effect_that_the_model_never_uses_is_pointed_out():
         records.append({"time_s": np.arange(100.0), "u": u, "y": 2.0 * u + 0.05 * draw.standard_normal(100)})
     effects = [Effect(name, Parameter("per", "1", 0.3, -5.0, 5.0)) for name in ("used", "forgotten")]
     assert said_of(records, lacuna.System(simulate, GAIN, effects)) == (
-        "Effect forgotten changes no prediction, at none of its sizes that fits begin at: does the model use it, and do"
-        " these records reach it?",
+        "Effect forgotten changes no prediction at any of its start sizes: does the model use it, and do these"
+        " records excite it?",
     )
 
 
@@ -122,8 +122,8 @@ def test_of_three_repeated_conditions_the_middle_one_is_never_fitted_unless_one_
 
 
 def test_a_limit_beside_a_stronger_effect_is_tried_though_none_of_its_sizes_helps_as_it_is():
-    """A quadratic drain, and an output that is clipped at 11.9: the sizes of `clip` (a declared 10 V, and others) do
-    nothing or harm beside the drain as it was fitted alone."""
+    """A quadratic drain and an output clipped at 11.9 V: with the drain as fitted alone, each start size of `clip` (the
+    declared 10 V and others) changes nothing or makes the fit worse."""
     n = 60
 
     def simulate(record, theta):

@@ -1,4 +1,4 @@
-"""Every misuse is refused before the search, by the name of its trial and channel; what may mislead is a warning."""
+"""Misuse is refused before the search, by trial and channel; data and models that may mislead cause a warning."""
 
 import math
 import re
@@ -27,7 +27,7 @@ DRAW = np.random.default_rng(0)
 
 
 class Line(System):
-    """y = slope t, with a bend on offer; written as the documentation says, and no more than that."""
+    """y = slope t, with a bend as an effect: the least that the documentation requires of a system."""
 
     name = "line"
 
@@ -53,7 +53,7 @@ def bending(trials=None, **told):
 
 
 def changed(**changes):
-    """Pulls of which the first is changed."""
+    """The pulls, the first of them changed."""
     first, *others = TRIALS
     return bending(experiments="pull", trials=(replace(first, **changes), *others))
 
@@ -103,11 +103,11 @@ REFUSED = {
     "run 0, channel y: fewer than 8 valid samples": changed(channels={"y": np.full(101, np.nan)}),
     "run 0 has no channel": changed(channels={}),
     "trial run 1: more than one trial has this name": changed(name="run 1"),
-    "run 0, channel y: effect bend .* push is none of its `experiments`": changed(experiment="push"),
+    "run 0, channel y: effect bend .* push is not among its `experiments`": changed(experiment="push"),
     "run 0, channel y: constant, as in every trial of pull": Line(trials=[replace(t, channels=TWO) for t in TRIALS]),
     "effect bend is listed under the key curve": Line(effects={"curve": Effect("bend", BEND)}),
-    "effect bend is freed at nowhere, which is no correction site": bending(freed_at="nowhere"),
-    "effect bend needs slope apart, which lacks": bending(apart="slope"),
+    "effect bend is freed at nowhere, which is not a correction site": bending(freed_at="nowhere"),
+    "effect bend declares slope in `apart`, but that parameter has no `at_least`": bending(apart="slope"),
     "parameter slope: more than one": Line(parameters=2 * Line().parameters),
     "run 0: its nuisance slope": Line(nuisances=lambda trial: (Parameter("slope", "", 1.0, 0.0, 2.0),)),
 }
@@ -165,7 +165,7 @@ REFUSED_DECLARATIONS = {
     },
     "apart of effect bend names 'slop', which is no parameter": {"effects": Effect("bend", BEND, apart="slop")},
     "absent at infinity": {"effects": replace(heater.LIMITED, parameters=Parameter("W", "W", 8.0, -1.0, np.inf))},
-    "a typical one, which is not 0": {
+    "a typical value other than 0": {
         "effects": replace(heater.LIMITED, parameters=Parameter("W", "W", 0.0, 0.0, np.inf))
     },
     r"curve 'loss\.left': choose another name, without a dot": {"curves": replace(LOSS, name="loss.left")},
@@ -254,7 +254,7 @@ def test_refuses_an_effect_saying(said):
     ],
 )
 def test_refuses_a_parameter_that_is_none(told):
-    """A negative spread of a nuisance would be taken, and end in another verdict."""
+    """A negative spread of a nuisance, if accepted, would lead to another verdict."""
     why = "not a number|is not below|outside|fits begin there|a number above 0|not negative|the lower first"
     with pytest.raises(DeclarationError, match=f"gain: {next(iter(told))} .*({why})|is of type"):
         Parameter("gain", "", **{"value": 1.0, "lower": 0.1, "upper": math.inf, **told})
@@ -281,7 +281,7 @@ def test_numbers_of_numpy_are_numbers():
 @pytest.mark.parametrize(
     ("told", "said"),
     [
-        ({"lower": 9.0}, "9.0 to 9.0 is no finite range"),
+        ({"lower": 9.0}, "9.0 to 9.0 is not a finite range"),
         ({"upper": math.inf}, "0.0 to inf is no"),
         ({"lower": "0"}, "'0' to 9.0 is no"),
         *(({"scale": given}, f"scale is {given}") for given in (0.0, -0.1, math.nan)),
@@ -310,7 +310,7 @@ def test_a_factor_that_cannot_be_absent_is_pointed_out():
     def added(record, theta):
         return {"y": theta.gain * record.time_s + 1e-6 * theta.stretch.factor}
 
-    said = "Effect stretch is absent where its factor is 0, .*absent=1"
+    said = "Effect stretch is declared absent when its factor is 0, .*absent=1"
     with pytest.raises(MisuseError, match=said):
         said_of(records, lacuna.System(multiplied, GAIN, factor))
     (warning,) = said_of(records, lacuna.System(added, GAIN, factor))
@@ -324,7 +324,7 @@ def test_a_factor_that_cannot_be_absent_is_pointed_out():
 def test_where_every_condition_is_spare_nothing_is_left_to_be_fitted():
     records = heater.records(2)
     system = heater.system(spare={one["condition"] for one in records.values()})
-    with pytest.raises(TooLittleDataError, match="Every condition is `spare`, and none is left to be fitted"):
+    with pytest.raises(TooLittleDataError, match="Every condition is `spare`, so none is left to fit"):
         lacuna.diagnose(system, records, progress=False)
 
 
@@ -385,7 +385,7 @@ def test_warns_of_a_parameter_at_its_bound():
 
 
 def test_warns_of_a_direction_that_the_data_leave_open():
-    """A gain and the scale of what it multiplies cancel."""
+    """The data determine only the product of the two parameters."""
     volts = Parameter("volts", "", 1.0, 0.01, 100.0)
     system = heater.modelled(lambda record, theta: theta.volts * heater.bare(record, theta), volts)
     assert "hardly determine a combination of gain_K_W, volts" in warned(system)
@@ -404,13 +404,13 @@ def test_warns_of_a_nuisance_at_its_limit():
     records["steps_4W_1"]["temperature_K"] += 5.0
     drift = Parameter("drift_K", "K", 0.0, -50.0, 50.0, scale=0.05)
     system = heater.modelled(lambda record, theta: heater.bare(record, theta) + theta.drift_K, nuisances=drift)
-    said = "drift_K is more than 3.5 standard deviations from what is expected in steps_4W_1"
+    said = "drift_K is more than 3.5 standard deviations from its expected value in steps_4W_1"
     assert said in " ".join(lacuna.diagnose(system, records, progress=False).warnings)
 
 
 @pytest.mark.slow
 def test_warns_of_an_effect_that_would_need_the_opposite_sign():
-    """What is hidden is a loss of power, where only a gain of it is on offer."""
+    """The hidden offset is a loss of power; the library offers only a gain."""
     only_positive = replace(heater.OFFSET, parameters=Parameter("power_W", "W", 0.5, 0.0, 5.0))
     system = heater.system(heater.SENSOR, only_positive, heater.LIMITED, heater.DEAD)
     assert "offset would fit with a power_W below 0 W, which its bounds forbid" in warned(system, offset__power_W=-0.6)
@@ -434,7 +434,7 @@ def test_warns_of_an_input_with_a_gap():
 
 
 def counted(name, factor=1000.0):
-    """The records with their times under another name, multiplied."""
+    """The records with their times under another name, multiplied by a factor."""
     found = heater.records(2)
     for one in found.values():
         one[name] = one.pop("time_s") * factor
@@ -443,8 +443,8 @@ def counted(name, factor=1000.0):
 
 def test_milliseconds_for_seconds_are_pointed_out():
     said = said_of(counted("time"))
-    assert any("samples are 500 s apart, and the longest time of the model is 12 s" in one for one in said)
-    assert any("call it time_ms" in one for one in said)
+    assert any("500 s apart, too far to resolve even the longest time constant" in one for one in said)
+    assert any("name it time_ms" in one for one in said)
     for name, factor in (("time", 1.0), ("time_ms", 1000.0)):
         assert not said_of(counted(name, factor))
 
@@ -452,7 +452,7 @@ def test_milliseconds_for_seconds_are_pointed_out():
 def test_milliseconds_are_pointed_out_where_no_parameter_is_a_time():
     records = {f"{k}": {"time": np.arange(0, 2000, 10), "y": DRAW.standard_normal(200)} for k in range(4)}
     (said,) = said_of(records, RAMP)
-    assert "10 s apart, all of them whole numbers" in said
+    assert "10 s apart, and all times are whole numbers" in said
 
 
 def test_which_of_two_clocks_was_taken_is_said():
@@ -496,7 +496,7 @@ def test_a_model_that_writes_into_what_it_is_given_is_told_the_column(column):
 
 
 def test_a_model_may_return_one_array_again_and_again():
-    """Nor do threads of a search write into it at a time."""
+    """The threads of a search must not overwrite each other's results in it."""
     kept = np.empty(len(heater.TIME_S))
 
     def thrifty(record, theta):
@@ -525,20 +525,20 @@ def test_a_function_that_fails_is_told_with_its_record(which):
 
 
 def test_refuses_a_model_that_follows_what_was_measured():
-    """One step ahead of it nothing seems to be missing; a start from the first samples is no such thing."""
+    """Predicting one step ahead hides what is missing; only starting from the first measured samples is allowed."""
 
     def following(record, theta):
         before = np.concatenate([[0.0], record["temperature_K"][:-1]])
         return before + theta.gain_K_W * record["power_W"] / theta.tau_s
 
     for records in (heater.records(2), lacuna.segments(heater.records(1)["steps_4W_1"], 5)):
-        with pytest.raises(MisuseError, match=r"channel temperature_K: the prediction follows what was measured"):
+        with pytest.raises(MisuseError, match=r"channel temperature_K: the prediction depends on the measured samples"):
             said_of(records, heater.modelled(following))
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.int32])
 def test_a_model_may_have_what_was_measured_give_its_kind_and_drive_another_part(kind):
-    """Rounded otherwise it would seem to follow what was measured; and one output may be an input of the next."""
+    """A difference in rounding must not pass for following the measurement; one output may be an input of the next."""
 
     def simulate(record, theta):
         free = np.zeros_like(record["temperature_K"])
@@ -571,5 +571,5 @@ def test_refuses_a_diagnosis_that_cannot_be_done_like_this(how):
 
 @pytest.mark.parametrize("records", [None, {}])
 def test_refuses_a_function_in_place_of_a_system(records):
-    with pytest.raises(MisuseError, match="the first is a System, not function"):
+    with pytest.raises(MisuseError, match="the first must be a System, not function"):
         lacuna.diagnose(heater.simulate, records, progress=pytest.fail)

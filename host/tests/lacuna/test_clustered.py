@@ -1,4 +1,4 @@
-"""The jackknife over conditions, against refits without each of them and against the truth."""
+"""The jackknife over conditions, compared with refits that leave each one out, and with the truth."""
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from lacuna.run import with_records
 
 TIME_S = np.linspace(0.0, 10.0, 60)
 TRUTH = {"slope": 2.0, "level": 1.0}
-REACH = [0.2, 0.3, 0.4, 0.5, 0.8, 3.0]  # of the input: the last condition says most about the slope
-OWN = 0.1  # what each condition adds: no model is exactly true
+REACH = [0.2, 0.3, 0.4, 0.5, 0.8, 3.0]  # of the input: the last condition determines the slope best
+OWN = 0.1  # discrepancy of each condition: no model is exactly true
 
 
 def simulate(record, theta):
@@ -47,13 +47,13 @@ def test_of_a_linear_model_it_is_how_far_refits_without_a_condition_move():
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say_where_one_condition_says_most():
-    """The plain sandwich's hold the slope in two of three."""
+    """The jackknife's do; those of the plain sandwich estimator contain the slope in two of three cases."""
     held = []
     for seed in range(120):
         one = fitted(measured(seed))
         held.append([lower <= TRUTH[name] <= upper for name, (lower, upper) in intervals(one).items()])
     for share in np.mean(held, axis=0):
-        assert share > 0.83, "binomial, 120 draws at 0.9: fewer happen once in a hundred"
+        assert share > 0.83, "binomial, 120 draws at 0.9: a smaller share occurs once in a hundred"
 
 
 def test_one_condition_says_nothing_of_what_others_would():

@@ -1,4 +1,4 @@
-"""Without repeats every known record is predicted once from the others."""
+"""Without repeats, cross-validation predicts every known record once from the others."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def system(simulate=simulate, *decoys):
 
 
 def records(seed, count, bend=0.0, steps=0.0, **more):
-    """`steps`: standard deviation of a level of each record's own."""
+    """Records of a bend. `steps`: standard deviation of the level between records."""
     draw, other = np.random.default_rng(seed), np.random.default_rng([seed, 1])
     time_s = np.linspace(0.0, 1.0, 40)
     return [
@@ -50,7 +50,7 @@ def judged(case):
 
 
 def test_each_record_is_predicted_by_the_mean_of_the_others():
-    """Of a constant, where that is leave-one-out in closed form."""
+    """For a constant model the errors are those of leave-one-out in closed form."""
     found = judged(measured(1, 5, steps=0.3))
     known = found.fitted.problem.trials
     assert sorted(found.errors) == sorted(trial.name for trial in known)
@@ -67,7 +67,7 @@ def test_it_is_due_where_nothing_is_repeated():
 
 
 def test_an_effect_is_judged_alone_though_more_sets_than_are_compared_cost_less_with_it():
-    """A library of decoys: pairs of the right effect with each of them may all be a little cheaper than it alone."""
+    """The right effect alone is judged even if its pairs with each of many decoys all cost a little less."""
     decoys = [Effect(f"decoy_{k}", Parameter("per_x", "", 0.5, -5.0, 5.0)) for k in range(12)]
 
     def with_decoys(record, theta):
@@ -82,7 +82,7 @@ def test_an_effect_is_judged_alone_though_more_sets_than_are_compared_cost_less_
     tried = [case.judge(fit(Structure(told, effects), known, floor)) for effects in sets]
     alone, pairs = tried[1], tried[2:]
     assert sum(pair.fitted.cost < alone.fitted.cost for pair in pairs) == 12
-    for pair in pairs:  # whatever their parameters cost them
+    for pair in pairs:  # whatever their parameters add to the cost
         pair.__dict__["cost"] = min(pair.cost, alone.cost - 1e-3)
     found = cross_fitted(case, Search(tried[0], floor, tuple(tried), ()), NOBODY)
     assert found.with_effects(("bend",)) is not None
@@ -95,9 +95,9 @@ def test_the_names_do_not_depend_on_the_order_of_the_records():
 
 
 def test_records_that_show_more_than_those_fitted_are_told():
-    """The bend shows where x is largest, in the one record that judges at the end."""
+    """A warning tells that the bend shows where x is largest, in the one final test record."""
     given = records(2, 7, bend=0.3)
     found = lacuna.diagnose(system(), given[2:] + given[:2], progress=False)
     assert found.verdict == "none"
-    assert any("Records that were not fitted (r6) are predicted to 1.39 times the noise" in w for w in found.warnings)
+    assert any("The test records (r6) are predicted with an error of 1.39 times the noise" in w for w in found.warnings)
     assert not lacuna.diagnose(system(), records(2, 7), progress=False).warnings

@@ -1,4 +1,4 @@
-"""What a diagnosis is handed on as: a page, a record, and words of doubt."""
+"""The outputs of a diagnosis: a page, a record, and doubts about its verdict."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def test_what_is_named_is_not_what_the_data_would_hardly_show(found):
 
 
 def test_where_something_matters_it_is_told_where(found):
-    """By the test that decides, however many standard deviations that is."""
+    """The test's probability decides what is listed, however many standard deviations that is."""
     small = Remainder({KEY: 0.5}, {KEY: 2.9}, {KEY: 0.004}, {KEY: 0.0}, POLICY)
     assert small.matters
     assert "position_mm in sweep (0.7 x the floor)" in describe(found.base, small).text
@@ -65,9 +65,9 @@ def test_final_records_and_a_likelier_set_speak_against_a_verdict(found):
     (little,) = but_too_little(found.choice, found.split, 0.3, POLICY)
     assert "by only 30 % of what is missing there: it is not named" in little
     (harm,) = but_too_little(found.choice, found.split, -0.3, POLICY)
-    assert "With delay most records are predicted better, but those that chose nothing" in harm
+    assert "With delay most records are predicted better, but the test records" in harm
     assert found.split.final[0].name in harm
     assert "too little" in but_too_little(found.choice, found.split, None, POLICY)[0]
     likelier = replace(found.choice, weights=found.choice.weights | {("delay", "stiction"): 3.0})
     (odds,) = doubts(likelier, found.split, None)
-    assert "With stiction, too," in odds
+    assert "With stiction added" in odds

@@ -1,5 +1,5 @@
-"""What a verdict drops: effects that may be absent, unless much is explained worse without them; and effects whose
-work is done by a curve at their place, unless their own formula does most of it, too."""
+"""Backward elimination drops an effect that may be absent unless the fit is much worse without it, and one that a
+learnt curve can replace unless its own formula does most of the work."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.revise import eliminate
 from lacuna.diagnosis.search import Search
 
-OPEN, SURE = (-1.0, 1.0), (0.01, 0.05)  # intervals: one that holds 0, one that does not
+OPEN, SURE = (-1.0, 1.0), (0.01, 0.05)  # intervals with and without 0
 
 
 @pytest.mark.parametrize(("true_s", "stays"), [(0.03, True), (0.0, False)])

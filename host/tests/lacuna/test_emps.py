@@ -26,7 +26,7 @@ FILE = ROOT / "docs" / "examples" / "emps.py"
 def emps():
     spec = importlib.util.spec_from_file_location("emps", FILE)
     module = importlib.util.module_from_spec(spec)
-    sys.modules["emps"] = module  # compiled code that is loaded again looks its module up by name
+    sys.modules["emps"] = module  # cached compiled code looks up its module by name
     spec.loader.exec_module(module)
     return module
 
@@ -42,7 +42,7 @@ def test_names_friction_and_its_asymmetry(verdict):
 
 
 def test_reaches_the_published_errors_on_both_records(emps, verdict):
-    """Of 1 s windows, in mm, each begun at its measured position and speed, as SciPy's fits were judged."""
+    """The RMS error over 1 s windows, each started at its measured position and speed, as for SciPy's fits."""
 
     def rmse_mm(file, theta):
         records = [t.record(["position_mm"]) for t in emps.windows(emps.read(DATA / file))]
@@ -59,7 +59,7 @@ def _predicted(emps, record, theta):
 
 
 def test_rejects_the_decoy_where_the_pulses_were_applied(emps):
-    """With pulses at other places of each cycle no window repeats another."""
+    """The decoy is also rejected if no window repeats another, with the pulses at other phases of each cycle."""
     tables = lacuna.windows(emps.read(DATA / "DATA_EMPS_PULSES.mat"), 1.0, every=1.04)
     found = lacuna.diagnose(emps.system, tables, progress=False)
     names = {e.name for e in found.effects}
@@ -68,7 +68,7 @@ def test_rejects_the_decoy_where_the_pulses_were_applied(emps):
 
 
 def test_a_cycle_of_another_length_is_refused(emps):
-    """Taken for 6.249 s (it is 6.240 s), windows drift apart, and what they differ by would pass for noise."""
+    """If 6.249 s is declared in place of 6.240 s, the windows drift apart, and the drift would pass for noise."""
     tables = lacuna.windows(emps.read(DATA / "DATA_EMPS.mat"), 1.0, every=6.249 / 6, period=6.249)
     with pytest.raises(lacuna.LacunaError, match="declared as repeats"):
         lacuna.diagnose(emps.system, tables, progress=False)

@@ -126,7 +126,7 @@ def test_a_learnt_curve_is_the_natural_spline_through_its_knots():
 
 
 class Block(System):
-    """A block on a table holds at most `holding_N`, then slides; what slides at once shows no static friction."""
+    """A block on a table that holds up to `holding_N`, then slides; if it slides at once, static friction is hidden."""
 
     name, effects = "block on a table", {}
     parameters = (
@@ -156,7 +156,7 @@ def test_static_friction_comes_back_from_below_the_kinetic_one(start):
 
 
 class FadingBlock(Block):
-    """The same, and static friction may fade with speed; it cannot exceed 3 N."""
+    """The same block; static friction is at most 3 N and may fade with speed."""
 
     effects: ClassVar = {"fading": Effect("fading", Parameter("speed_m_s", "m/s", 0.1, 0.0, 1.0), apart=("holding_N",))}
     parameters = (

@@ -1,4 +1,4 @@
-"""The engine as a newcomer uses it: a plain function, records of any kind, a verdict."""
+"""The engine as a new user meets it: a plain function, records of any kind, a verdict."""
 
 import io
 import os
@@ -15,6 +15,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import heater
+import matplotlib
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -61,7 +62,7 @@ def test_the_completed_model_is_called_like_the_first(verdict):
 
 
 def test_the_completed_model_knows_every_record(verdict):
-    """Those too that judged it: as SciPy fits the same parameters to all of them."""
+    """Its parameters are fitted to the held-out records too: they agree with SciPy's fit to all records."""
     names = ["gain_K_W", "tau_s", "sensor_lag.lag_s"]
     residuals = heater.residuals_of(heater.records(seed=1, **LAG).values(), names)
     fitted = least_squares(residuals, [verdict.theta[name] for name in names], x_scale=[0.1, 1.0, 0.1]).x
@@ -85,9 +86,9 @@ def test_it_is_said_if_the_final_records_speak_against_what_was_named():
     final = {trial.name for trial in case_of(with_records(heater.system(), records)).split.final}
     mixed = {name: (other if name in final else records)[name] for name in records}
     found = lacuna.diagnose(heater.system(), mixed, progress=False)
-    assert list(found.diagnosis.choice.candidate.effects) == ["sensor_lag"], "they inform no choice"
-    assert (found.verdict, found.effects) == ("unexplained", ()), "but nothing is named that they contradict"
-    said = r"With sensor_lag most records are predicted better, but those that chose nothing \(.*\) by only 4. %"
+    assert list(found.diagnosis.choice.candidate.effects) == ["sensor_lag"], "the final records inform no choice"
+    assert (found.verdict, found.effects) == ("unexplained", ()), "but an effect that they contradict is not named"
+    said = r"With sensor_lag most records are predicted better, but the test records \(.*\) improve by only 4. %"
     assert any(re.match(said, warning) for warning in found.warnings)
 
 
@@ -95,7 +96,7 @@ def test_it_is_said_of_what_is_supported_that_it_explains_too_little(monkeypatch
     monkeypatch.setattr("lacuna.diagnosis.case.Case.closed", lambda *asked: 0.4)
     found = lacuna.diagnose(heater.system(), heater.records(**LAG), progress=False)
     assert found.verdict == "unexplained"
-    assert found.warnings[0].startswith("sensor_lag: a better prediction beyond doubt, but too little")
+    assert found.warnings[0].startswith("sensor_lag predicts better beyond doubt, but explains too little")
     assert "though not named: sensor_lag" in str(found)
 
 
@@ -124,7 +125,11 @@ def test_a_verdict_is_short_in_a_line_and_one_screen_in_print(verdict):
 @pytest.mark.slow
 def test_report_and_plot_show_what_was_not_fitted(verdict, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
+    before = matplotlib.get_backend()
+    matplotlib.use("svg")
     page = verdict.report(tmp_path / "report.html").read_text()
+    assert matplotlib.get_backend() == "svg", "the user's backend, a notebook's for one, stays as it is"
+    matplotlib.use(before)
     for heading in ("What was measured", "Where the residual is", "Error before and after", "not fitted"):
         assert heading in page
     assert 'src="http' not in page

@@ -1,4 +1,4 @@
-"""A plain function as a system: what it may do while a search tries it, and what its factors' derivatives are."""
+"""A plain function as a system: its failures during a search, and derivatives with respect to its factors."""
 
 import math
 
@@ -25,7 +25,7 @@ def test_what_a_loop_reads_of_an_effect_is_no_search_among_names():
         _ = found.wire
 
 
-FAR = 1.3  # a gain from which the model fails
+FAR = 1.3  # the model fails above this gain
 
 
 def failing(how):
@@ -67,7 +67,7 @@ def test_a_wrong_shape_from_the_start_is_refused():
 
 @pytest.mark.parametrize("lower", [0.1, -1.0])
 def test_the_derivative_by_a_factor_is_that_of_its_parameter(lower):
-    """Whichever coordinate the parameter is fitted in: at a lower bound above 0 its logarithm."""
+    """A factor's derivative is right in every coordinate (with a lower bound above 0, the logarithm is fitted)."""
 
     def simulate(record, theta):
         return {"temperature_K": theta.gain_K_W * theta.wobble * np.cumsum(record["power_W"])}

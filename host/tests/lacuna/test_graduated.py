@@ -1,4 +1,4 @@
-"""Fits that begin far away: records that jump, places that isolated trials cannot tell apart, starts that fail."""
+"""Fits from distant starts: records that jump, places that isolated trials cannot tell apart, starts that fail."""
 
 from typing import ClassVar
 
@@ -20,8 +20,8 @@ FLOOR = NoiseFloor({(experiment, "y_m"): ChannelNoise(SD, 0.0, 1.0, 0) for exper
 
 
 class Jumping(System):
-    """A record that jumps by `height_m` at `jump_s`. Alone it shows how far `place_m` is from 2 m, not on which side;
-    together with a slope it shows that too. Far from what is known of `shape` there is no simulation at all."""
+    """Records that jump by `height_m` at `jump_s`. The first shows how far `place_m` is from 2 m, not on which side;
+    the second has a slope that shows this too. Far from the prior mean of `shape`, the simulation fails."""
 
     name = "jumping"
     effects: ClassVar = {}
@@ -97,19 +97,19 @@ def test_a_blurred_view_leaves_missing_samples_out_and_weighs_what_is_slow_as_be
     point = problem.start(problem.structure.values(TRUTH | {"shape": 2.5}))
     sharp, blurred = problem.residuals(point)[0], problem.seen(View(1 / 50)).residuals(point)[0]
     assert len(sharp) == 801
-    assert 195 < len(blurred) < 255  # four or five a time constant, of which the gap is some
-    assert np.sum(blurred**2) == pytest.approx(np.sum(sharp**2), rel=0.2)  # it begins at 0
+    assert 195 < len(blurred) < 255  # four or five per time constant, less those in the gap
+    assert np.sum(blurred**2) == pytest.approx(np.sum(sharp**2), rel=0.2)  # the filter starts at 0
     away = problem.start(problem.structure.values(TRUTH | {"jump_s": 4.02}))
     there = problem.start(problem.structure.values(TRUTH))
     views = [problem.seen(view) for view in (View(), View(1 / 50))]
     changed = [view.residuals(away)[0] - view.residuals(there)[0] for view in views]
     felt = [np.mean(np.abs(c) > 0.01 * np.abs(c).max()) for c in changed]
-    assert felt[1] > 10 * felt[0]  # a jump that is late shows for a while
+    assert felt[1] > 10 * felt[0]  # blurred, a late jump shows for longer
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_converged_fit_is_the_least_squares_one_from_either_side(seed):
-    """Where the model lacks something large, compressed residuals end elsewhere than plain ones."""
+    """If the model lacks something large, compressed residuals have another optimum than plain ones."""
     system = Jumping(seed, elsewhere=(1.0, 3.0), bump=1.0)
     starts = [Structure(system).values(TRUTH | {"height_m": height}) for height in (1.7, 2.3)]
     fits = [fit(Structure(system), system.trials, FLOOR, starts=[start]) for start in starts]

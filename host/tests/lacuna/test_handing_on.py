@@ -1,4 +1,4 @@
-"""A verdict as it is handed on: tables, a file, a log; and what a person may say of the test."""
+"""A verdict as tables, a file and a log; and a test set chosen by the user."""
 
 import json
 import logging
@@ -47,7 +47,7 @@ def test_a_verdict_is_saved_and_loaded(verdict, tmp_path):
 @pytest.mark.parametrize("text", ["", "{}", "[1]", json.dumps({"record": {}, "theta": {}, "text": ""})])
 def test_what_is_no_verdict_is_refused(text, tmp_path):
     (tmp_path / "no.json").write_text(text)
-    with pytest.raises(lacuna.LacunaError, match="is no verdict"):
+    with pytest.raises(lacuna.LacunaError, match="is not a verdict"):
         lacuna.load(tmp_path / "no.json")
 
 

@@ -1,4 +1,4 @@
-"""Parameters that are fixed or tied: what the model is given, what is told of them, and what is refused."""
+"""Fixed and tied parameters: what the model is given, what is reported, and what is refused."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ SPARE = Parameter("tau_other_s", "s", 3.0, 0.1, 100.0)
 
 
 def seen(**held):
-    """What `simulate` is given where everything that is fitted is 2, and the system."""
+    """The values that `simulate` receives when all fitted parameters are 2, and the system."""
     system = lacuna.System(heater.simulate, (*heater.PARAMETERS, SPARE), [SPREAD], outputs="temperature_K", **held)
     fitted = {p.name: system.coordinate(p.name).fitted(2.0) for p in system.parameters}
     return system.values(fitted | {"spread.size": 0.5}), system
@@ -64,7 +64,7 @@ def test_a_diagnosis_names_the_same_and_tells_of_what_it_held():
         ({"fixed": {"spread.at_W": -1e9}}, "spread.at_W is fixed at -1e"),
         ({"fixed": ["tau_s"]}, "fixed is"),
         ({"tied": "tau_s"}, "tied is 'tau_s'"),
-        ({"fixed": {"spread.size": 0.0}}, "spread.size sizes an effect"),
+        ({"fixed": {"spread.size": 0.0}}, "spread.size sets the size of an effect"),
         ({"tied": {"tau_s": "mass"}}, "tau_s is tied to 'mass', which is not one of gain_K_W"),
         ({"tied": {"tau_s": "tau_s"}}, "tau_s is tied to 'tau_s'"),
         ({"tied": {"tau_s": "gain_K_W"}, "fixed": {"tau_s": 1.0}}, "both fixed and tied"),

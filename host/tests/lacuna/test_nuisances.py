@@ -1,4 +1,4 @@
-"""Nuisances are drawn anew in each run: where repeats share them, the model lacks what they follow, or says so."""
+"""Nuisances differ from run to run: if repeats share them, the effect that they follow is named, or a warning given."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def system(spread_mm=SPREAD_MM):
 
 
 def records(seed, of_condition, spread_mm=SPREAD_MM, per_mm2=0.0):
-    """Four runs at each temperature, with its own value of `of_condition` besides each run's own zero."""
+    """Four runs at each temperature, with a shift from `of_condition` in addition to each run's own zero."""
     x = 2.0 * np.sin(2.0 * np.pi * TIME_S)
     draw = np.random.default_rng(seed)
     return {
@@ -75,11 +75,11 @@ def test_nuisances_of_their_own_follow_nothing():
     for seed in range(3):
         found = lacuna.diagnose(system(), records(seed, np.zeros(6)), progress=False)
         assert found.verdict == "none"
-        assert not [said for said in found.warnings if "zero_mm" in said], "neither a condition nor an average"
+        assert not [said for said in found.warnings if "zero_mm" in said], "neither by condition nor on average"
 
 
 def test_what_a_condition_sets_is_told_and_no_effect_named():
-    """Neither grows with the temperature: where the runs of each condition begin."""
+    """A zero that differs between conditions without growing with the temperature causes a warning only."""
     found = lacuna.diagnose(system(), records(4, (0.7, -0.5, 0.6, -0.7, 0.5, -0.6)), progress=False)
     assert not found.effects
     assert len(followed(found)) == 1
@@ -104,8 +104,7 @@ def test_a_base_fit_leaves_the_noise_however_far_apart_runs_begin(spread_mm):
 
 @pytest.mark.parametrize("parameters", [1, 2])
 def test_probability_of_meeting_conditions_by_chance(parameters):
-    """That of an effect that has nothing to do with what conditions happen to have is uniform: a regression on random
-    regressors, in place of an effect's."""
+    """The probability is uniform for an effect unrelated to the conditions, here a regression on random regressors."""
     draw, found = np.random.default_rng(5), []
     for _ in range(400):
         mean = draw.standard_normal(8)
@@ -126,7 +125,7 @@ def test_no_share_of_a_gap_is_given_where_nuisances_had_closed_it(expanding, tmp
 
 
 def test_nuisances_that_are_all_a_little_off_are_pointed_out():
-    """None is far from what is expected by itself; together they are five standard errors off."""
+    """A warning is given if no nuisance is far off by itself, but their mean is by five standard errors."""
     found = lacuna.diagnose(system(), records(0, np.full(6, SPREAD_MM)), progress=False)
     (said,) = [one for one in found.warnings if one.startswith("zero_mm")]
     assert "on average over 24 trials, where 0 mm is expected" in said

@@ -1,4 +1,4 @@
-"""What records and models are like that nobody was careful with: rounded, sampled unevenly, run away."""
+"""Careless records and models: rounded, sampled unevenly, diverging."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def system(simulate=line, effects=()):
 
 
 def floor_of(samples, predicted=False):
-    """Of two records alike. `predicted`: beside a model that leaves nothing of them."""
+    """Noise floor of two equal records. `predicted`: with a model that predicts them exactly."""
     trials = with_records(system(), [{"time_s": np.arange(float(len(samples))), "y": samples}] * 2).trials
     residuals = {trial.name: {"y": 0.0 * samples} for trial in trials} if predicted else None
     return estimate_noise(system(), trials, residuals=residuals).channels["run", "y"].sd
@@ -47,7 +47,7 @@ def test_a_floor_is_at_least_what_rounding_leaves(step, seed):
 @given(st.floats(0.2, 1.0), st.integers(1, 4), st.integers(0, 1000))
 @settings(max_examples=30)
 def test_a_rounded_record_written_with_few_decimals_has_the_same_floor(step, decimals, seed):
-    """An ADC of 0.3226 K, logged as 22.83, 23.15, 23.48: steps of 0.32 and 0.33."""
+    """An ADC with a step of 0.3226 K, logged as 22.83, 23.15, 23.48, appears to have steps of 0.32 and 0.33."""
     draw = np.random.default_rng(seed)
     slow = 20.0 + np.cumsum(draw.standard_normal(400)) * 0.3 * step
     rounded = np.round(step * np.round(slow / step), decimals)
@@ -60,7 +60,7 @@ def test_a_record_that_was_not_rounded_has_no_rounding():
     decimals = np.round(np.sin(np.linspace(0, 9, 400)) + 1e-2 * draw.standard_normal(400), 3)
     assert floor_of(decimals, predicted=True) < 1e-3
     assert floor_of(np.sin(np.linspace(0, 9, 400)) + 1e-3 * draw.standard_normal(400)) < 1.5e-3
-    again = np.tile(np.sin(np.linspace(0, 2 * np.pi, 20, endpoint=False)), 20)  # the same values, and no grid
+    again = np.tile(np.sin(np.linspace(0, 2 * np.pi, 20, endpoint=False)), 20)  # repeated values, but no grid
     assert floor_of(again, predicted=True) < 1e-3
 
 
@@ -92,13 +92,13 @@ def test_even_times_stay_as_they_are_and_uneven_ones_become_even():
 
 
 def test_samples_on_either_side_of_a_gap_are_no_neighbours():
-    """Two stretches of a slow trace, far apart: joined, they would be one that remembers itself over the gap."""
+    """If two distant stretches of a slow trace were joined, they would seem correlated across the gap."""
     draw = np.random.default_rng(2)
     parts = [np.convolve(draw.standard_normal(2000), np.ones(20), mode="same") / 4.5 for _ in range(2)]
     gap = np.full(300, np.nan)
     joined = np.concatenate([parts[0], gap, parts[1]])
     assert correlation_samples([joined]) == pytest.approx(correlation_samples(parts), rel=0.05)
-    period = np.sin(2 * np.pi * np.arange(60) / 60.0)  # half a period is missing, and again, and again
+    period = np.sin(2 * np.pi * np.arange(60) / 60.0)  # half of every period is missing
     holes = np.where(np.arange(6000) % 60 < 30, np.tile(period, 100), np.nan)
     halves = holes[np.isfinite(holes)]
     assert correlation_samples([holes]) != pytest.approx(correlation_samples([halves]), rel=0.2)
@@ -112,7 +112,7 @@ def blurred(time_s, y):
 
 
 def test_a_low_pass_is_one_in_time_whatever_the_sampling():
-    """A pulse that is measured densely, or as densely as the rest, blurs alike."""
+    """A pulse is blurred alike, whether sampled more densely than the rest or not."""
     even = np.linspace(0, 10, 1001)
     dense = np.sort(np.concatenate([np.linspace(0, 4, 101), np.linspace(4, 6, 900)[1:], np.linspace(6, 10, 101)[1:]]))
 
@@ -139,7 +139,7 @@ def test_uneven_records_are_diagnosed():
     assert [e.name for e in found.effects] == ["bend"]
 
 
-# --- Models that run away ---
+# --- Models that diverge ---
 
 
 @pytest.mark.parametrize("beyond", [1e30, 1e160, 1e200, 1.7e308, np.inf, -np.inf, np.nan])

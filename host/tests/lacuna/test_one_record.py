@@ -1,4 +1,4 @@
-"""One long record without repeats: the right mechanisms from the default settings, however effects are written down."""
+"""One long record without repeats: the right mechanisms from the default settings, however effects are parametrised."""
 
 from types import SimpleNamespace
 
@@ -21,7 +21,7 @@ BOTH = LIMIT | {"sensor_lag__lag_s": 3.0}
 
 
 def record(seed, samples=4000, slow_K=0.0, **hidden):
-    """Temperature under a random staircase of power; `slow_K`: of noise with a correlation time of 10 s."""
+    """Temperature under a random staircase of power. `slow_K`: SD of noise with a correlation time of 10 s."""
     draw = np.random.default_rng(seed)
     power_W = np.repeat(draw.uniform(-12.0, 12.0, samples // 60 + 1), 60)[:samples]
     wander_K = slow_K * slow(draw.standard_normal(samples), np.exp(-heater.SAMPLE_S / 10.0))
@@ -46,7 +46,7 @@ def test_names_both_effects_by_segments_of_one_run(slow_K):
 
 
 def test_the_answer_is_the_same_in_either_parametrisation():
-    """Fitted in one coordinate, so not just alike: the same."""
+    """Both parametrisations are fitted in one coordinate, so the results are equal, not just similar."""
     one = record(4, slow_K=0.3, **LIMIT)
     limit, inverse = (
         diagnosed(one, heater.SENSOR, heater.OFFSET, size, heater.DEAD) for size in (heater.LIMITED, heater.INVERSE)
@@ -92,7 +92,7 @@ def test_slow_noise_without_an_effect_is_said_to_be_either():
     assert left.verdict == "unexplained"
     (said,) = [w for w in left.warnings if "correlation time" in w]
     seconds = float(said.split("about ")[1].split(" s")[0])
-    assert 5.0 < seconds < 15.0  # 10 s in truth
+    assert 5.0 < seconds < 15.0  # the truth is 10 s
 
 
 @pytest.mark.parametrize("told", [10.0, {"temperature_K": 10.0}, "estimated"])
@@ -134,7 +134,7 @@ def test_a_segment_is_the_end_of_a_run_from_the_beginning():
 
 
 def test_too_short_a_record_is_refused():
-    with pytest.raises(RecordError, match="not enough for three windows"):
+    with pytest.raises(RecordError, match="too short for three windows"):
         lacuna.windows(record(8, samples=600), 150.0)
     with pytest.raises(RecordError, match="too few for 100 segments"):
         lacuna.segments(record(8, samples=600), 100)
@@ -143,7 +143,7 @@ def test_too_short_a_record_is_refused():
 
 
 def _found(verdict, left, floor):
-    """A diagnosis as far as its misfit: what the best explanation leaves of one channel, and its floor."""
+    """A stub of a diagnosis: the residual that the best explanation leaves in one channel, and its floor."""
     trial = SimpleNamespace(name="a", experiment="run")
     final = SimpleNamespace(residuals=lambda: {"a": {"y": np.full(9, left)}}, problem=SimpleNamespace(trials=(trial,)))
     floors = SimpleNamespace(channels={("run", "y"): SimpleNamespace(sd=floor)})
@@ -151,7 +151,7 @@ def _found(verdict, left, floor):
 
 
 def test_explanations_far_above_the_floor_are_compared_at_a_fraction_of_what_they_leave():
-    """From a raised floor of 0.05 a better one is found, which lies below it; from 0.002 no better one is."""
+    """With the floor raised to 0.05 a better explanation is found, which leaves less than that; with 0.002, none is."""
     raised = []
 
     def again(system):
@@ -169,7 +169,7 @@ def test_explanations_far_above_the_floor_are_compared_at_a_fraction_of_what_the
     ("verdict", "left", "floor"), [("identified", 0.009, 0.001), ("none", 1.0, 0.001), ("unexplained", 21.0, 1.0)]
 )
 def test_near_the_floor_or_without_a_gap_nothing_is_compared_again(verdict, left, floor):
-    """21 floors would ask for a floor of 1.05: one is raised only by what changes a comparison."""
+    """A misfit of 21 floors would raise the floor by 5 % only, too little to change a comparison."""
     first = _found(verdict, left, floor)
     assert compared_at_misfit(heater.system(), first, pytest.fail) == (first, {})
 
@@ -181,7 +181,7 @@ def test_where_a_raised_floor_hides_everything_the_first_answer_stands():
 
 @pytest.mark.parametrize(("cubic", "verdict"), [(0.3, "identified"), (0.0, "none")])
 def test_a_record_that_is_itself_fast_does_not_pass_for_noise(cubic, verdict):
-    """Nine samples a period: second differences of the record say nothing of the noise."""
+    """At nine samples per period, second differences of the record do not measure the noise."""
     draw, time_s = np.random.default_rng(0), np.arange(0.0, 1.0, 0.002)
 
     def simulate(record, theta):

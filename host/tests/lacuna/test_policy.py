@@ -1,4 +1,4 @@
-"""Each rule of the engine: listed with its reason, and the case on either side of it."""
+"""Each rule of the engine: listed with its reason, and tested on either side of its threshold."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -34,7 +34,7 @@ def test_drift_chance_a_trend_is_a_drift_where_shuffled_orders_seldom_show_it():
         case = case_of(hide({}, **how))
         fitted = case.on_known(case.judge(case.fit_base(1)))
         assert bool(find_drift(fitted)) is found
-        assert find_drift(fitted, policy=replace(POLICY, drift_chance=1.0)), "any trend, where chance does not count"
+        assert find_drift(fitted, policy=replace(POLICY, drift_chance=1.0)), "with a chance of 1, any trend counts"
 
 
 @pytest.mark.slow
@@ -60,8 +60,8 @@ def test_a_drift_within_the_accuracy_that_counts_is_told_and_the_verdict_is_none
 
 
 class Tried:
-    """As much of a candidate as the choice looks at: cost on the trials fitted and on those checked, by condition.
-    `beyond`: what the compression of large residuals hides of the mean square of those checked."""
+    """A stub of a candidate with what the choice uses: costs on the fitted and on the checked trials, by condition.
+    `beyond`: the part of the checked trials' mean square that the compression of large residuals hides."""
 
     pieces = 2000.0
 
@@ -78,7 +78,7 @@ class Tried:
 
 
 def tried(effects, excess, *, unseen=0.5, conditions=8, beyond=0.0):
-    """A candidate whose cost exceeds the floor's by `excess`, `unseen` of it on the trials that were not fitted."""
+    """A candidate whose cost exceeds the floor's by `excess`, a share `unseen` of it on trials that were not fitted."""
     half = 500.0 / conditions
     fitted = (half + (1 - unseen) * excess / conditions,) * conditions
     return Tried(effects, fitted, (half + unseen * excess / conditions,) * conditions, beyond)
@@ -89,7 +89,7 @@ def found(*candidates):
 
 
 def worse(one, other, base=None, *, matters=True, policy=POLICY):
-    """Whether `one` is out because of `other`."""
+    """Whether `one` is dominated by `other`."""
     among = found(base or tried((), 4000.0), one, other)
     return Comparison(among, policy, lambda *_: matters).worse(one, other)
 
@@ -107,24 +107,24 @@ def test_gain_an_effect_must_bring_more_than_chance():
 def test_gain_counts_in_units_of_what_the_best_explanation_leaves():
     one, other = tried((), 1300.0), tried(("a",), 1000.0)
     assert worse(one, other)
-    assert not worse(one, other, policy=replace(POLICY, gain=160.0)), "of 300, in units of twice the floor"
+    assert not worse(one, other, policy=replace(POLICY, gain=160.0)), "300, halved: twice the floor is left"
 
 
 def test_unseen_gain_part_of_the_gain_must_be_on_trials_that_were_not_fitted():
     base = tried((), 40.0, unseen=0.5)
-    assert worse(base, tried(("a",), 20.0, unseen=0.8), base), "4 of the 20 gained"
-    assert not worse(base, tried(("a",), 20.0, unseen=0.95), base), "1 of the 20 gained"
+    assert worse(base, tried(("a",), 20.0, unseen=0.8), base), "4 of the gain of 20 are on trials not fitted"
+    assert not worse(base, tried(("a",), 20.0, unseen=0.95), base), "1 of the gain of 20 is on trials not fitted"
 
 
 def test_an_effect_must_not_buy_small_residuals_with_large_ones():
     base = tried((), 40.0)
     assert worse(base, tried(("a",), 20.0), base)
     larger = tried(("a",), 20.0, beyond=10.0)
-    assert not worse(base, larger, base), "one walk that fails costs little where it is compressed"
+    assert not worse(base, larger, base), "compressed, one failed walk costs little"
 
 
 def test_doubt_what_a_few_conditions_contradict_is_not_beyond_it():
-    """Better by 40 where half of the conditions is better by 15 and half worse by 5; and by 40 in all alike."""
+    """A gain of 40 counts if all conditions share it, not if half of them gain 15 each and the others lose 5."""
     base = Tried((), (62.5,) * 8, (80.0,) * 8)
     mixed = Tried(("a",), (62.5,) * 8, (65.0,) * 4 + (85.0,) * 4)
     alike = Tried(("a",), (62.5,) * 8, (75.0,) * 8)
@@ -145,7 +145,7 @@ def test_share_an_effect_must_close_a_share_of_what_is_left():
 
 
 def test_share_of_gap_a_further_effect_that_closes_little_goes_into_the_remainder():
-    """By mean squares, whatever the compressed cost says of it."""
+    """The share is that of mean squares, whatever the compressed cost says."""
     base, one, least = tried((), 10_000.0), tried(("a",), 1500.0), POLICY.share_of_gap * 10_000
     both = chosen(base, one, tried(("a", "b"), 1500.0 - 1.2 * least)).candidate
     assert both.effects == ("a", "b")
@@ -201,7 +201,7 @@ def test_of_two_pairs_that_explain_alike_each_effect_could_be_either_of_the_othe
 
 
 def test_a_small_set_with_an_effect_that_nothing_supports_is_not_chosen_for_being_small():
-    """d imitates b and c; all of the weight is on the three that are true."""
+    """d imitates b and c, but all of the weight is on the three true effects."""
     base, false = tried((), 10_000.0), tried(("a", "d"), 300.0)
     pair, true = tried(("a", "b"), 700.0), tried(("a", "b", "c"), 200.0)
     choice = chosen(base, false, pair, true)
@@ -211,7 +211,7 @@ def test_a_small_set_with_an_effect_that_nothing_supports_is_not_chosen_for_bein
 
 def test_supported_an_effect_is_in_most_of_the_weight():
     base, small, large = tried((), 10_000.0), tried(("d",), 6.0), tried(("a", "b"), 0.0)
-    assert chosen(base, small, large).candidate is small, "it may be as good"
+    assert chosen(base, small, large).candidate is small, "the smaller set may be as good"
     small, large = tried(("d",), 220.0), tried(("a", "b"), 200.0)
     assert chosen(base, small, large).candidate is large
     assert chosen(base, small, large, policy=replace(POLICY, supported=0.0)).candidate is small
@@ -225,7 +225,7 @@ def test_a_chosen_set_in_a_better_minimum_stands_for_what_was_tried_of_it():
 
 
 def test_weights_are_not_sure_of_what_differs_from_condition_to_condition():
-    """Two explanations, one better by e^60 in all: in one condition far better, in the others a little worse."""
+    """Two explanations: one is likelier by e^60 in all, far better in one condition, a little worse in the others."""
     base = tried((), 4000.0)
     a = Tried(("a",), (62.5 - 80.0 + 100, *(62.5 + 100,) * 7), (62.5 + 100,) * 8)
     b = Tried(("b",), (62.5 + 100, *(62.5 + 98.7,) * 7), (62.5 + 98.7,) * 8)

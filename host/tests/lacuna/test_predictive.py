@@ -1,4 +1,4 @@
-"""What the factors of each run take up: an effect that goes with the condition is no scatter between runs."""
+"""Effects absorbed by the factors of each run: an effect that depends on the condition is not scatter between runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ def measured(fading_mm_s: float, seed: int) -> Pulls:
 
 
 def diagnosed(fading_mm_s: float, seed: int):
-    """A data set, and its base fit."""
+    """The case of a data set, and its base fit."""
     case = case_of(measured(fading_mm_s, seed))
     return case, case.judge(case.fit_base(1))
 
@@ -104,7 +104,7 @@ def test_nothing_is_grown_on_an_explanation_with_a_learnt_curve():
 
 
 def test_an_effect_with_nothing_to_do_is_refitted_from_all_of_its_sizes():
-    """Steps with derivatives from where both frictions are one would make them one again, whatever the size."""
+    """From equal frictions, steps along derivatives would make them equal again, whatever the start size."""
     case, base = diagnosed(10.0, 8)
     one = moved(base.fitted, holding_N=base.fitted.theta["sliding_N"])
     structure = Structure(case.system, ("fading",))
@@ -115,7 +115,7 @@ def test_an_effect_with_nothing_to_do_is_refitted_from_all_of_its_sizes():
     problem = refitted.problem
     alone = [solve(problem, problem.start(v, one.solution.point.nuisances), **COARSE).cost for v in begun]
     assert refitted.cost == min(alone)
-    assert max(alone) > min(alone) + POLICY.gain, "only some of the sizes lead there"
+    assert max(alone) > min(alone) + POLICY.gain, "only some of the start sizes lead to the optimum"
 
 
 @pytest.mark.parametrize(("fading_mm_s", "seed", "verdict"), [(10.0, 5, "identified"), (0.0, 6, "none")])

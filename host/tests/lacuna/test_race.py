@@ -1,4 +1,4 @@
-"""Scores that rank effects, and the race that fits them."""
+"""Screening scores that rank effects, and the race that fits them."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ SHAPES = {"a": np.cos(2 * TIME_S), "b": np.cos(3 * TIME_S), "c": np.cos(2 * TIME
 
 
 def lines(shapes, sizes, seed=0) -> lacuna.System:
-    """A line, and what is added to it: all linear, so that first order is all there is."""
+    """A line plus the shapes: a linear model, so that a first-order score is exact."""
 
     def simulate(record, theta):
         return {"y": theta.slope * TIME_S + sum(theta[f"{name}.size"] * shape for name, shape in shapes.items())}
@@ -49,14 +49,14 @@ def scored(case, base=None):
 
 
 def test_the_score_of_one_effect_is_what_a_fit_with_it_gains():
-    """In a linear model, within three times the size that the secant has."""
+    """In a linear model the score is exact, up to three times the size at which the secant was taken."""
     case = linear({"a": 0.03})
     base = case.fit_base(1)
     promises = scored(case, base).singles()
     assert promises[0].effect == "a"
     fitted = race_module.solve(promises[0].problem, promises[0].start)
     residuals = np.concatenate(base.problem.residuals(base.solution.point))
-    assert np.abs(residuals).max() < 5.0, "hardly compressed"
+    assert np.abs(residuals).max() < 5.0, "hardly any residual is compressed"
     assert promises[0].gain == pytest.approx(base.cost - fitted.cost, rel=0.05)
 
 
@@ -78,7 +78,7 @@ def test_what_is_suspected_is_fitted_whatever_it_promises():
         tried = {c.effects for c in found.tried if "tone_8" in c.effects}
         assert {len(effects) for effects in tried} >= {1, 2} if suspected else not tried
         soon = search(case, case.judge(case.fit_base(1)), enough=lambda c: bool(c.effects), workers=NOBODY)
-        assert any(c.effects == ("tone_8",) for c in soon.tried) == bool(suspected), "one is enough"
+        assert any(c.effects == ("tone_8",) for c in soon.tried) == bool(suspected), "even where one effect is enough"
     with pytest.raises(MisuseError, match="suspected: there is no effect 'tone_9'; there are tone_0, tone_1"):
         lacuna.diagnose(system, suspected=["tone_8", "tone_9"], progress=False)
 
@@ -120,7 +120,7 @@ def bench(effects, seed) -> Case:
 
 
 def lost(case: Case) -> Candidate:
-    """A base fit that is nowhere near, and continues from nothing."""
+    """A base fit far from the optimum, without sensitivities to continue from."""
     astray = moved(case.fit_base(1), mass_kg=4.0, stiffness_N_m=190.0, damping_Ns_m=19.0)
     return case.judge(replace(astray, solution=replace(astray.solution, sensitivities=())))
 

@@ -1,4 +1,4 @@
-"""Folders of CSV as people have them: labels in words, marks of spreadsheets, and cells that are no numbers."""
+"""CSV folders as found in practice: labels in words, byte-order marks, and cells that are not numbers."""
 
 import importlib
 import tempfile
@@ -80,12 +80,12 @@ def test_an_empty_cell_is_a_missing_sample(tmp_path):
         ("time_s,y,who\n0,1,Ann\n1,,Bob\n", r"a\.csv, line 2, column who: 'Ann' is text.*leave the column out"),
         ("time_s,y,valve\n0,1,0\n1,2,open\n", r"a\.csv, line 3, column valve: 'open' is"),
         ('time_s,y,force\n0,1,"1,000.5"\n1,2,"1,200.5"\n', "line 2, column force: '1,000.5' is"),
-        # What a spreadsheet could not compute is no remark, and lines above the names are called that.
+        # A spreadsheet's error value is not a comment, and lines above the column names are reported as such.
         ("time_s,y\n0,1\n#N/A,2\n2,3\n", r"a\.csv, line 3, column time_s: '#N/A' is not a number"),
         ("time_s,y\n0,1\n#DIV/0!,2\n2,3\n", "line 3, column time_s: '#DIV/0!'"),
         (
             "Test,today\nUnits,mm\ntime_s,y,u\n0,1,2\n",
-            r"line 3: 3 values for 2 columns\. If the names stand further down, remove",
+            r"line 3: 3 values for 2 columns\. If the column names are further down, remove",
         ),
     ],
 )
@@ -126,12 +126,12 @@ def test_parts_of_several_runs_go_together_by_the_runs_names():
     assert parts[0].name == "monday, segment 1"
     cut = [part for run in runs for part in windows(run, 25.0, period=50.0)]
     assert len({part.name for part in cut}) == 8
-    assert len({part.labels["condition"] for part in cut}) == 2, "the same phase of a cycle, on whatever day"
+    assert len({part.labels["condition"] for part in cut}) == 2, "the same phase of a cycle, in whichever run"
 
 
 REFUSED_ARRAYS = {
     "a record of y, u has no times: give a column time_s": {"y": np.zeros(9), "u": np.zeros(9)},
-    r"sample 0: column force is not all numbers: .*1,000\.5": {"time_s": [0.0, 1.0], "force": ["1,000.5", "2"]},
+    r"sample 0: column force has .*1,000\.5.*not a number": {"time_s": [0.0, 1.0], "force": ["1,000.5", "2"]},
     "sample 1: column note .*windy.*leave the column out": {"time_s": [0.0, 1.0], "note": ["", "windy"]},
 }
 
@@ -149,7 +149,7 @@ def test_refuses_arrays_saying(said):
 def test_only_plain_decimals_are_numbers(tmp_path, cell):
     with pytest.raises(RecordError, match=r"a\.csv, line 3, column y: .* is not a number"):
         read(write(tmp_path, "a.csv", f"time_s,y\n0,1\n1,{cell}\n", encoding="utf-8"))
-    with pytest.raises(RecordError, match="record record 1, sample 1: column y is not all numbers"):
+    with pytest.raises(RecordError, match=r"record record 1, sample 1: column y has .*not a number"):
         read({"time_s": [0.0, 1.0], "y": ["1", cell]})
 
 
@@ -298,7 +298,7 @@ def test_anything_else_is_gone_through_cell_by_cell(tmp_path, text):
     "name", ["records.Table", "records.read", "records.segments", "values.Values", "errors.MisuseError"]
 )
 def test_what_scripts_outside_import_keeps_its_name(name):
-    """Written as text, so that whoever renames it in all files meets it here."""
+    """The names are text here, so that renaming in all files at once does not pass unnoticed."""
     module, own = name.split(".")
     assert hasattr(importlib.import_module(f"lacuna.{module}"), own)
 
@@ -315,4 +315,4 @@ def test_single_values_in_attrs_are_inputs_of_the_record():
     record = table.record(["y"])
     assert (record.condition, record["ambient_K"], record["pump"]) == (3, 300.0, "on")
     assert sorted(record.inputs) == ["ambient_K", "pump", "room_K"]
-    assert record["room_K"][0] == 295.0, "a column says it better"
+    assert record["room_K"][0] == 295.0, "a column takes precedence"

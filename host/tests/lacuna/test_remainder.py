@@ -1,5 +1,5 @@
-"""Structure is found wherever it is: in conditions that were run once, between samples that are missing, where a
-prediction fails, and without noise."""
+"""Structure is found wherever it is: in conditions run once, between missing samples, where a prediction fails, and
+without noise."""
 
 from dataclasses import replace
 
@@ -18,14 +18,14 @@ KEY = ("steps", "position_mm")
 
 
 class OneChannel(System):
-    """A system of which only the accuracy is asked."""
+    """A stub of a system that states only its accuracy."""
 
     def __init__(self, good_enough):
         self.accuracy = lambda experiment, channel: good_enough
 
 
 def remainder(rows, *, missing=(), good_enough=0.0, policy=POLICY, correlation_samples=1.0):
-    """Of residuals by condition, each of shape (repeats, samples). `missing`: slices that were not measured."""
+    """The remainder of residuals by condition, each of shape (repeats, samples). `missing`: slices not measured."""
     trials, scaled = [], []
     for condition, repeats in rows.items():
         for z in repeats:
@@ -43,12 +43,12 @@ def noise(repeats, seed, samples=1000):
 
 
 def sharing(rms, **how):
-    """Of four repeats that share a sine."""
+    """The remainder of four repeats that share a sine."""
     return remainder({"a": noise(4, 0) + rms * SINE}, **how)
 
 
 def test_what_the_first_repeat_has_no_channel_of_is_seen_in_the_others():
-    """An optional channel, such as a second marker."""
+    """Structure is found in a channel that the first repeat lacks, such as an optional second marker."""
     shared = 2.0 * SINE + noise(2, 0)
     trials = [Record("0", KEY[0], "a", TIME_S, {})]
     trials += [Record(f"{k}", KEY[0], "a", TIME_S, {KEY[1]: TIME_S}) for k in (1, 2)]
@@ -58,23 +58,23 @@ def test_what_the_first_repeat_has_no_channel_of_is_seen_in_the_others():
 
 
 def test_relevance_what_a_prediction_within_a_tenth_of_the_floor_leaves_does_not_matter():
-    assert sharing(0.40).found, "it is no chance"
+    assert sharing(0.40).found, "not by chance"
     assert not sharing(0.40).matters, "RMS 1.08 of the floor"
     assert sharing(0.52).matters, "RMS 1.13 of the floor"
 
 
 def test_relevance_gives_way_to_the_accuracy_that_the_person_asked_for():
-    assert sharing(2.0, good_enough=0.3).matters, "0.4 mm shared where 0.3 mm were asked"
-    assert not sharing(2.0, good_enough=0.5).matters, "0.4 mm shared where 0.5 mm are good enough"
+    assert sharing(2.0, good_enough=0.3).matters, "0.4 mm are shared, 0.3 mm are good enough"
+    assert not sharing(2.0, good_enough=0.5).matters, "0.4 mm are shared, 0.5 mm are good enough"
 
 
 def test_that_nothing_was_found_does_not_say_that_nothing_is_missing():
-    """Equivalence: what may be missing, not what was found, is less than what matters."""
+    """Equivalence: the bound on what may be missing, not the estimate, has to be below relevance."""
     short = {"a": noise(2, 0, samples=12)}
     assert not remainder(short).matters
     assert remainder(short).cannot_tell["steps"] > np.sqrt(POLICY.relevance)
     assert not sharing(0.0).cannot_tell
-    assert not remainder(short, good_enough=10.0).cannot_tell, "what is asked is met"
+    assert not remainder(short, good_enough=10.0).cannot_tell, "the required accuracy is met"
 
 
 def test_chance_decides_what_counts_as_structure():
@@ -131,7 +131,7 @@ def test_missing_samples_do_not_dilute_structure(every):
 
 
 def test_noise_is_seldom_structure_where_repeats_end_early():
-    """A repeat has nothing to say of the time after its end: not its last residual for ever."""
+    """A repeat contributes nothing after its end; its last residual is not held."""
     found = 0
     for seed in range(40):
         draw = np.random.default_rng(seed)

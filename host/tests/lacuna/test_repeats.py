@@ -1,4 +1,4 @@
-"""Repeats that are none, and what is said of them before a search."""
+"""Repeats that are not repeats, and the warnings about them before a search."""
 
 import heater
 import numpy as np
@@ -18,7 +18,7 @@ def in_another_unit(column):
     column *= 1e3
 
 
-def switched_off(column):  # at rest, as no channel may be in every trial
+def switched_off(column):  # constant, which no channel may be in every trial
     column[:] = 0.0
 
 
@@ -28,7 +28,7 @@ def test_one_that_is_unlike_all_others_is_pointed_out(mistake, which):
     records = heater.records(3)
     mistake(records[which]["temperature_K"])
     (said,) = said_of(records)
-    assert said.startswith(f"Trial {which}, channel temperature_K: unlike its repeats")
+    assert said.startswith(f"Trial {which}, channel temperature_K: differs from its repeats")
     assert "leave it out" in said
     if mistake is spiked:
         assert f"most at {heater.TIME_S[77]:g} s" in said
@@ -51,7 +51,7 @@ def test_a_copy_is_no_repeat():
     records = heater.records(2)
     records["steps_4W_2"]["temperature_K"] = records["steps_4W_1"]["temperature_K"].copy()
     (said,) = said_of(records)
-    assert said == "Trials steps_4W_1 and steps_4W_2 are the same record: a copy is no repeat. Leave it out."
+    assert said == "Trials steps_4W_1 and steps_4W_2 are identical: a copy is not a repeat. Leave one out."
 
 
 def test_repeats_that_are_not_declared_are_asked_for():
@@ -59,7 +59,7 @@ def test_repeats_that_are_not_declared_are_asked_for():
     for name, record in records.items():
         record["condition"] = name
     (said,) = said_of(records)
-    assert said.startswith("Trials steps_4W_1 and steps_4W_2 have the same inputs, and nothing is declared as a repeat")
+    assert said.startswith("Trials steps_4W_1 and steps_4W_2 have the same inputs, but no repeats are declared")
     assert not said_of({name: record for name, record in records.items() if name.endswith("_1")})
 
 
@@ -84,19 +84,18 @@ def test_a_column_with_fewer_values_than_there_are_times_is_refused():
 
 @pytest.mark.parametrize("other", [True, False])
 def test_a_model_that_counts_samples_is_pointed_out_where_repeats_have_other_times(other):
-    """The heater's does: half of the samples seem to take half of the time."""
+    """A model that counts samples, as the heater's, takes half of the samples for half of the time."""
     records = heater.records(3)
     for name in (name for name in records if other and name.endswith("_2")):
         records[name] |= {column: records[name][column][::2] for column in ("time_s", "power_W", "temperature_K")}
     verdict = lacuna.diagnose(heater.system(), records, progress=False)
-    assert any("does the model count samples where times differ" in said for said in verdict.warnings) == other
+    assert any("does the model count samples" in said for said in verdict.warnings) == other
 
 
 @pytest.mark.parametrize(("bend", "verdict"), [(4e-4, "identified"), (0.0, "none")])
 @pytest.mark.parametrize("spread", [0.2, 5.0])
 def test_runs_that_differ_by_more_than_the_noise_do_not_hide_what_is_missing(spread, bend, verdict):
-    """An offset of each run, up to a hundred times the noise: a floor that is taken from what repeats differ by must
-    not keep it."""
+    """Each run has an offset of up to a hundred times the noise, which must not remain in the noise floor."""
     time_s, draw = np.arange(0.0, 10.0, 0.05), np.random.default_rng(1)
 
     def simulate(record, theta):

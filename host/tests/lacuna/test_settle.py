@@ -1,4 +1,4 @@
-"""The last steps of a fit: a model whose simulation has an error of its own, and parameters that act almost alike."""
+"""The last steps of a fit, with numerical error in the simulation and parameters that act almost alike."""
 
 from dataclasses import replace
 from typing import ClassVar
@@ -16,8 +16,8 @@ from lacuna.system import Effect, Parameter, Record, System
 
 SD = 0.1
 TRUTH = {"slope": 1.0, "bent": 2.0}
-ERROR = 0.002 * SD  # of the simulation: every sample's goes up and down with the parameters in a way of its own
-# Short enough for the steps of derivatives to see another error, long enough for the last bit of a parameter not to.
+ERROR = 0.002 * SD  # of the simulation: each sample's varies with the parameters in its own way
+# Short enough for the error to change over a derivative's step, long enough not to change with a parameter's last bit.
 ERROR_LENGTH = 1e-3
 FRICTION_SD = 0.05
 T = np.linspace(0.0, 1.0, 1000)
@@ -57,7 +57,7 @@ class Lines(System):
 
 
 def expected_sd(runs: int) -> np.ndarray:
-    """Of slope and bent, by hand: the factors eliminated at the truth."""
+    """Standard deviations of slope and bent, by hand: the factors are eliminated at the truth."""
     jacobian = columns() / SD
     along = jacobian @ list(TRUTH.values())
     normal = jacobian.T @ jacobian
@@ -83,14 +83,14 @@ def test_what_the_simulation_gets_wrong_does_not_pass_for_information():
         after.append(stated_sd(settled) / expected_sd(4))
         assert settled.solution.converged
         assert settled.cost <= rough.cost
-    assert (np.median(before, axis=0) < 0.8).all()  # or this test shows nothing
+    assert (np.median(before, axis=0) < 0.8).all()  # otherwise this test shows nothing
     assert np.median(after, axis=0) == pytest.approx(1.0, rel=0.05)
     assert np.array(after) == pytest.approx(1.0, rel=0.15)
 
 
 @pytest.mark.slow
 def test_settled_estimates_scatter_as_they_say():
-    """About 1.1: for three runs whose factors are estimated too, a parabola is not quite the truth."""
+    """The ratio is about 1.1: with three runs and their factors estimated too, the cost is not quite a parabola."""
     before, after = [], []
     for seed in range(100):
         rough = fitted(Lines(runs=3, seed=seed))
@@ -101,7 +101,7 @@ def test_settled_estimates_scatter_as_they_say():
 
 @pytest.fixture(scope="module")
 def stopped():
-    """At the upper bound of `bent`, where the truth lies five standard deviations beyond."""
+    """Fits at the upper bound of `bent`; the truth lies five standard deviations beyond it."""
     return [fitted(Lines(runs=2, upper=1.5, seed=seed)) for seed in SEEDS]
 
 
@@ -118,7 +118,7 @@ def test_a_search_that_ended_just_short_of_a_bound_was_stopped_by_it_too(stopped
 
 
 def test_the_last_steps_stay_within_the_bounds():
-    """A standard deviation is longer than the way to the bound."""
+    """The last steps stay within a bound that is less than a standard deviation away."""
     for seed in SEEDS:
         free = settle(fitted(Lines(runs=4, seed=seed)))
         system = WithinBounds(runs=4, upper=free.theta["bent"] + 0.6 * expected_sd(4)[1], seed=seed)
@@ -129,7 +129,7 @@ def test_the_last_steps_stay_within_the_bounds():
 
 
 class WithinBounds(Lines):
-    """Has no answer beyond its bounds, as a robot has none for a negative mass."""
+    """Lines that cannot be simulated beyond their bounds, as a robot cannot with a negative mass."""
 
     def predict(self, theta, effects, trial, **how):
         assert all(p.lower <= theta[p.name] <= p.upper for p in self.parameters)
@@ -143,12 +143,12 @@ def test_derivatives_by_a_factor_are_those_of_what_it_multiplies():
     for slopes, factor in (one.dense() for one in problem.jacobians(point, (0, 1), problem.first_steps())):
         np.testing.assert_allclose(factor[:, 0], slopes @ point.values / point.nuisances[0], rtol=1e-12, atol=1e-12)
     for slopes, factor in (one.dense() for one in problem.jacobians(point, (0,), problem.first_steps())):
-        assert not np.allclose(factor[:, 0], slopes[:, 0] * point.values[0]), "the other slope is held"
+        assert not np.allclose(factor[:, 0], slopes[:, 0] * point.values[0]), "the other slope is held fixed"
         assert factor.any()
 
 
 class Hum(System):
-    """y = level + size sin(2 pi t + phase), the phase another one in every run."""
+    """y = level + size sin(2 pi t + phase), with another phase in every run."""
 
     name = "hum"
     parameters = (Parameter("level", "m", 0.0, -1.0, 1.0, scale=0.1),)
@@ -178,7 +178,7 @@ def test_a_phase_may_leave_its_range():
 
 @pytest.mark.parametrize("from_trials", [True, False])
 def test_a_prior_from_the_trials_themselves_stands_back_where_parameters_are_told(from_trials):
-    """Two standard deviations off the truth, and as sure of itself as the data are."""
+    """A prior two standard deviations off shifts a fit by one, but not reported parameters if it is from the trials."""
     pulled, told = [], []
     for seed in SEEDS:
         system = Lines(runs=4, seed=seed)

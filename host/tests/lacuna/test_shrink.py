@@ -1,4 +1,4 @@
-"""Learnt curves where the data say nothing."""
+"""Learnt curves outside the range of the data."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def truth(x):
 
 
 def with_curve(seed, upper, offset=True):
-    """A sine plus an offset, and a curve over x of 0 to 1 of which records see 0 to `upper`."""
+    """A fit of a sine, an offset and a curve over x from 0 to 1, of which the records cover 0 to `upper`."""
     draw = np.random.default_rng(seed)
     x = upper * np.abs(np.sin(0.7 * TIME_S))
     y = np.sin(3.0 * TIME_S) + (1.0 if offset else 0.0) + truth(x)
@@ -47,7 +47,7 @@ def knots_of(fitted):
     return np.array([one.value for one in found]), np.array([one.sd for one in found])
 
 
-@pytest.mark.parametrize("offset", [True, False])  # with which a curve's mean is one and the same
+@pytest.mark.parametrize("offset", [True, False])  # an offset is confounded with the curve's mean
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_curve_is_zero_where_no_trial_went_give_or_take_its_size(seed, offset):
     before = with_curve(seed, upper=0.5, offset=offset)
@@ -81,7 +81,7 @@ def test_without_a_curve_there_is_nothing_to_shrink():
 
 
 def test_no_knot_of_a_learnt_curve_is_said_to_be_undetermined(monkeypatch):
-    """Beyond its data a curve is what its prior makes of it; a direction that is spread thin has no name at all."""
+    """Beyond the data a curve follows its prior; a direction spread over many parameters is not named at all."""
     case = case_of(hide({}, seed=31))
     name = case.system.parameters[0].name
     undetermined = ({"correction.spring.0_1": 0.9}, {"correction.spring.0_2": 0.6, name: 0.8}, {})

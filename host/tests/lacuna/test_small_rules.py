@@ -55,7 +55,7 @@ def test_missing_samples_are_no_neighbours():
 
 
 def test_a_frequency_that_no_record_resolves_begins_at_its_typical_value():
-    """Sampled at 10 Hz: no spectrum has a peak there, and without a start it would never be tried."""
+    """Records sampled at 10 Hz show no peak at 50 Hz; without a start there, the effect would never be tried."""
     sizes = (Parameter("size", "", 0.3, 0.0, 5.0), Parameter("f_Hz", "Hz", 50.3, 20.0, 100.0))
     hum = Effect("hum", sizes, frequency="f_Hz")
     time_s = np.arange(0.0, 10.0, 0.1)
@@ -92,7 +92,7 @@ def test_a_line_is_among_the_peaks_of_the_residual_whatever_the_records_duration
 
 
 def test_a_range_far_wider_than_records_resolve_is_searched_coarsely():
-    """A range of 100 kHz in records of 2000 s: no more cells than fit in memory."""
+    """A range of 100 kHz in records of 2000 s must not need more cells than fit in memory."""
     time_s = np.linspace(0.0, 2000.0, 1500, endpoint=False)
     scaled = [{"y": np.sin(2.0 * np.pi * 0.3 * time_s)}]
     trials = [Record("1", "run", "c", time_s, scaled[0])]

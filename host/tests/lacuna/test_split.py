@@ -1,4 +1,4 @@
-"""Every part of a split has what it is for, however few the trials are."""
+"""Every part of a split has the trials that it needs, however few there are."""
 
 import heater
 import numpy as np
@@ -38,7 +38,7 @@ def test_the_only_trial_of_an_experiment_is_not_held_out_since_its_floor_would_b
     given = list(trials(*"abcdefghij"))
     given[4] = Record("4", "cooling", "e", T, {"y": T})
     assert "4" in names(split_trials(given).fit)
-    assert names(split_trials(trials(*"abcdefghij")).final) == ["4", "9"], "others are"
+    assert names(split_trials(trials(*"abcdefghij")).final) == ["4", "9"], "other trials are"
 
 
 @pytest.mark.parametrize("conditions", ["aab", "aabc", "abc"])
@@ -79,9 +79,9 @@ def test_what_a_person_makes_the_test_is_it_though_it_is_of_an_experiment_of_its
 @pytest.mark.parametrize(
     ("given", "spare", "test", "says"),
     [
-        ("abc", (), "2", "test names 2: of the other records none is left to judge"),
-        ("abcd", (), "23", "test names 2, 3: of the other records none is left to judge"),
-        ("aabb", [("steps", "a")], "23", "test names 2, 3: of the other records none is left to be fitted"),
+        ("abc", (), "2", "test names 2: none of the other records is left to judge"),
+        ("abcd", (), "23", "test names 2, 3: none of the other records is left to judge"),
+        ("aabb", [("steps", "a")], "23", "test names 2, 3: none of the other records is left to fit"),
     ],
 )
 def test_a_test_that_leaves_too_little_is_refused(given, spare, test, says):

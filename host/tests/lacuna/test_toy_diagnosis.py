@@ -92,7 +92,7 @@ def test_final_trials_inform_nothing():
     again = diagnose(system)
     assert [(c.effects, c.cost) for c in again.search.tried] == [(c.effects, c.cost) for c in found.search.tried]
     assert again.choice.weights == found.choice.weights
-    assert again.explained.structure.effects == (), "but what they contradict is not named"
+    assert again.explained.structure.effects == (), "but an effect that they contradict is not named"
 
 
 def test_record_has_the_agreed_form():

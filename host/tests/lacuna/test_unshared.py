@@ -1,4 +1,4 @@
-"""What repeats do not share is no noise if an effect explains it that has values of its own in every trial."""
+"""A residual that repeats do not share is not noise if an effect with its own values in every trial explains it."""
 
 from dataclasses import dataclass, replace
 
@@ -20,7 +20,7 @@ HUM = Effect(
 
 @dataclass(frozen=True)
 class Humming(ToySystem):
-    """Its sensor hums, with another phase in every trial."""
+    """The toy with a sensor that hums, with another phase in every trial."""
 
     def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
         found = super().predict(theta, effects, trial, coarse=coarse, corrections=corrections)
@@ -45,7 +45,7 @@ def test_a_hum_whose_phase_no_two_trials_share_is_named():
     assert found.effects[0].parameters["frequency_Hz"] == pytest.approx(HUM_HZ, rel=0.01)
     assert found.before.held_out > 1.5 * found.floor.held_out
     assert found.after.held_out < 1.1 * found.floor.held_out
-    assert "no noise" in found.signature.text
+    assert "not noise" in found.signature.text
 
 
 def test_a_hum_is_named_beside_what_repeats_share():

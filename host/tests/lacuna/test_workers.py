@@ -1,4 +1,4 @@
-"""Who does the work of a search: the same results whoever does it, and nobody left behind."""
+"""The workers of a search: the same results whoever computes them, and no process left behind."""
 
 import os
 import subprocess
@@ -37,7 +37,7 @@ def test_what_is_most_work_is_begun_first(cores):
     def note(item: str) -> None:
         begun.append(item)
         if item == "long":
-            assert second.wait(10.0)  # the other thread does all the rest meanwhile
+            assert second.wait(10.0)  # meanwhile the other thread does the rest
         if len(begun) == 3:
             second.set()
 

@@ -1,9 +1,9 @@
-"""A mass on a spring that hides something: a small system with which the engine can be tried and tested.
+"""A mass on a spring with hidden effects: a small system for trying and testing the engine.
 
     m x'' = u(t - delay) - k x - k3 x^3 - (1 + wobble) b x' - c |x'| x' - f sign(x') - r sin(2 pi x / pitch)
 
-The base model knows m, k and b only; everything else is an effect, of which `hide` puts some into the
-measurements. The ripple `r` is in no library: it plays the part of what nobody thought of. Damping wobbles
+The base model knows m, k and b only; every other term is an effect, and `hide` puts some of them into the
+measurements. The ripple `r` is in no library: it stands for a mechanism that nobody thought of. Damping varies
 from run to run.
 """
 
@@ -36,13 +36,13 @@ from lacuna.system import (
     Theta,
 )
 
-NOBODY = Workers(lambda _: None)  # says nothing, and forks nothing
+NOBODY = Workers(lambda _: None)  # reports no progress and forks no process
 SAMPLE_S = 0.01
 STEPS_PER_SAMPLE = 8
 RIPPLE_PITCH_M = 0.06
 WOBBLE_SD = 0.02
 SENSOR_SD_MM = 0.2
-DRIFTING = {"seed": 16, "repeats": 6, "drift": 0.02}  # how `hide` draws a drift that is no noise
+DRIFTING = {"seed": 16, "repeats": 6, "drift": 0.02}  # arguments of `hide` for a drift that is not noise
 
 _BASE = (
     Parameter("mass_kg", "kg", 1.0, 0.2, 5.0, plausible=(0.8, 1.25), scale=0.1),
@@ -62,7 +62,7 @@ _EFFECTS = {
         ("asymmetric_friction", ("difference_N", "N", 0.3, -2.0, 2.0), 0.1, "friction", "F = d if x' > 0"),
     )
 }
-_IN_ITS_MOTION = [  # as `_simulate` takes them
+_IN_ITS_MOTION = [  # in the order of `_simulate`
     *(e.full_name(p) for e in _EFFECTS.values() for p in e.parameters if e.enters != "sensor"),
     "ripple.force_N",
 ]
@@ -104,7 +104,7 @@ def _simulate(force, p, table, lower, upper):
 
 @dataclass(frozen=True)
 class ToySystem(System):
-    """`trials` as measured; `effects` the library on offer."""
+    """The measured `trials`, and the library of `effects` on offer."""
 
     trials: tuple[Record, ...]
     effects: Mapping[str, Effect]
@@ -163,7 +163,7 @@ def _trial(experiment, size, repeat, order, position_mm) -> Record:
 
 
 def slow(noise: np.ndarray, correlation: float) -> np.ndarray:
-    """White noise made one of the same size whose neighbouring samples are correlated."""
+    """Correlate the neighbouring samples of white noise without changing its standard deviation."""
     return lfilter([np.sqrt(1 - correlation**2)], [1.0, -correlation], noise)
 
 
@@ -179,8 +179,8 @@ def hide(
 ) -> ToySystem:
     """Measure a mass on a spring that has `effects`, as {full parameter name: size}.
 
-    `withhold` takes effects out of the library that is offered; `drift` is the relative change of the
-    stiffness over the session; `noise_correlation` between neighbouring samples of the sensor's noise.
+    `withhold` removes effects from the library; `drift` is the relative change of the stiffness over the
+    session; `noise_correlation` is that between neighbouring samples of the sensor's noise.
     """
     draw = np.random.default_rng(seed)
     truth = draw_base(draw)
@@ -198,13 +198,13 @@ def hide(
 
 
 def case_of(system: System, spare=None, suspected: Sequence[str] = ()) -> Case:
-    """Any system under diagnosis. `spare`: conditions that are never fitted, if not those that the system spares."""
+    """The case of any system. `spare`: conditions that are never fitted; by default those that the system spares."""
     split = split_trials(system.trials, system.spare() if spare is None else spare)
     return Case(system, split, POLICY, 0, suspected)
 
 
 def with_effect(case: Case, effect: str) -> tuple[Candidate, Candidate]:
-    """The base model fitted, and fitted from there with an effect."""
+    """The fitted base model, and a fit with an effect that is warm-started from it."""
     base = case.judge(case.fit_base(1))
     structure = Structure(case.system, (effect,))
     start = [starting_point(base.fitted, structure)]
@@ -212,14 +212,14 @@ def with_effect(case: Case, effect: str) -> tuple[Candidate, Candidate]:
 
 
 def moved(fitted: Fit, **theta: float) -> Fit:
-    """A fit as it would be had it ended at `theta`."""
+    """The fit as if it had ended at `theta`."""
     point = replace(fitted.solution.point, values=fitted.structure.values(fitted.theta | theta))
     solution = replace(fitted.solution, point=point, cost=cost_of(fitted.problem, point))
     return replace(fitted, solution=solution)
 
 
 def draw_base(draw: np.random.Generator) -> dict[str, float]:
-    """The base model's parameters of a mass on a spring."""
+    """Draw the parameters of the base model."""
     return {
         "mass_kg": 1.0 * np.exp(0.05 * draw.standard_normal()),
         "stiffness_N_m": 40 * np.exp(0.05 * draw.standard_normal()),

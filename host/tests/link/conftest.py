@@ -1,4 +1,4 @@
-"""The Uno's own code, and the host's end of its link."""
+"""Fixtures: the Uno's own code, and the host's end of the link to it."""
 
 import pytest
 

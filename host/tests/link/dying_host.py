@@ -1,4 +1,4 @@
-"""A host that walks the robot at the port given, says its process, and talks on until it is killed."""
+"""A host that walks the robot at the given port, prints its process id, and communicates until it is killed."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-// Damages frames by the million and counts what the Uno's receiver and decoder take for something that was not sent.
+// Damages millions of frames and counts how often the Uno's receiver and decoder accept something that was not sent.
 #include <vector>
 
 #include "crc.h"
@@ -19,7 +19,8 @@ struct Random {
   uint32_t below(uint32_t n) { return static_cast<uint32_t>((static_cast<uint64_t>(next()) * n) >> 32); }
 };
 
-// Flips, replaces, drops, doubles and inserts; more of them as `rate_e4` grows; returns whether anything changed.
+// Damages a share of `rate_e4` / 10000 of the bytes, sometimes in bursts: flips a bit, or replaces, doubles, drops or
+// inserts a byte. Returns whether anything changed.
 bool damage(Random& random, std::vector<uint8_t>& bytes, uint32_t rate_e4) {
   std::vector<uint8_t> out;
   uint32_t burst = 0;
@@ -70,7 +71,7 @@ uint16_t harness_reflected(const uint8_t* data, size_t size, uint16_t crc) {
   return crc;
 }
 
-// Decodes one frame as it stands between its delimiters; returns the size of its fields, or -1.
+// Decodes one frame, given without its delimiters; returns the size of its fields, or -1 if it is rejected.
 int harness_decode(const uint8_t* data, size_t size, uint32_t session, uint8_t* frame) {
   bifa::FrameDecoder decoder;
   decoder.start();
@@ -89,7 +90,7 @@ size_t harness_encode(uint8_t message, uint8_t sequence, const uint8_t* fields, 
   return sent.size();
 }
 
-// How often the receiver, after `before`, takes something in `data` for a stop.
+// Returns how often the receiver, after `before`, recognizes a stop in `data`.
 int harness_stops(const uint8_t* before, size_t before_size, const uint8_t* data, size_t size) {
   bifa::Receiver receiver;
   uint8_t out;
@@ -103,9 +104,9 @@ int harness_stops(const uint8_t* before, size_t before_size, const uint8_t* data
   return stops;
 }
 
-// Damages `count` copies of good frames (in `pool`, each of `stride` bytes, its size in the first) and pushes them
-// through the receiver. What comes out must be one of the two last frames sent, unless the damage left one of them
-// as it was. results: damaged, accepted as sent, accepted wrongly, stops.
+// Pushes good frames, most of them damaged, through the receiver until `count` were damaged. `pool`: entries of
+// `stride` bytes: the frame's size, the frame, and at the end the message that it holds. A message that comes out
+// must be that of one of the last two frames. results: damaged, accepted as sent, accepted wrongly, stops.
 void harness_damage(const uint8_t* pool, size_t frames, size_t stride, uint32_t session, uint64_t seed, uint64_t count,
                     uint64_t* results) {
   Random random = {seed * 2654435761u + 88172645463325252ull};

@@ -1,4 +1,4 @@
-"""The console: one answer a line, strict numbers, nothing changes on a bad line."""
+"""The console: one answer per line, strict numbers, and bad lines change nothing."""
 
 import random
 import string
@@ -13,7 +13,7 @@ from harness.board import Board
 
 
 def shown(name: str, value: str, at_power_up: str | None = None) -> str:
-    """The line of `show` for a parameter at `value`, where power-up loads another, `at_power_up`."""
+    """The line of `show` for a parameter at `value`; `at_power_up` is the value that power-up loads, if it differs."""
 
     def with_unit(text: str) -> str:
         return f"{text} {BY_NAME[name].unit}".rstrip()
@@ -24,7 +24,7 @@ def shown(name: str, value: str, at_power_up: str | None = None) -> str:
 
 
 def places(value: str) -> str:
-    """With three decimals at least, as `set` has them."""
+    """Pad to at least three decimals, as `set` prints them."""
     whole, _, decimals = value.partition(".")
     return f"{whole}.{decimals:0<3}"
 
@@ -83,7 +83,7 @@ def test_show_marks_what_power_up_would_change(board):
     board.type("set duty_tail 0.25")
     assert marked() == ["period_s", "duty_tail"]
     board.type("save other")
-    assert marked() == ["period_s", "duty_tail"], "it is not what power-up loads"
+    assert marked() == ["period_s", "duty_tail"], "power-up does not load this preset"
     board.type("save")
     assert marked() == []
     board.type("load baseline")
@@ -112,7 +112,7 @@ SAID += ["help set", "help duty_body", "stream on", "plot on", "fly", "!", "x" *
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 def test_every_line_feed_has_its_carriage_return(board, end):
-    """On a terminal in raw mode, as picocom leaves it, a line feed alone goes down and no further."""
+    """On a terminal in raw mode, as with picocom, a line feed alone does not return to the left margin."""
     for line in SAID:
         board.write(line.encode() + end)
         board.sleep(0.05)
@@ -145,7 +145,7 @@ def test_the_stream_says_what_its_columns_are_and_their_units(board):
     samples = [line.removeprefix(">").split(",") for line in lines if line.startswith(">")]
     assert 99 <= len(samples) <= 103
     assert {len(sample) for sample in samples} == {len(columns)}
-    assert header in board.type("stream on")  # on request, also while it streams
+    assert header in board.type("stream on")  # repeated on request, even while it streams
 
 
 def test_a_plot_is_of_the_pressures(board):
@@ -268,7 +268,7 @@ def test_presets(board):
 
 
 def test_text_and_frames_share_the_port(board, connected):
-    """Whatever frames come in between, each line is answered, and the other way round."""
+    """Lines interleaved with frames are all answered, and so are the frames."""
     rng = random.Random(4)
     for i in range(100):
         line = "show period_s"

@@ -1,4 +1,4 @@
-"""The host dies while the robot walks: with `host_timeout_s` the robot vents in time, every time."""
+"""When the host dies while the robot walks, `host_timeout_s` always vents the robot in time."""
 
 import contextlib
 import os
@@ -21,7 +21,7 @@ HOST = Path(__file__).with_name("dying_host.py")
 
 
 class Mortal:
-    """A transport that goes dead after so many bytes, wherever in a frame that is."""
+    """A transport that fails after `lives` bytes, possibly in the middle of a frame."""
 
     def __init__(self, board: Board, lives: int) -> None:
         self.board, self.left = board, lives
@@ -49,7 +49,7 @@ def test_death_at_any_byte(timeout_s):
         with contextlib.suppress(ConnectionError):
             while True:
                 uno.status()
-        # The bytes on the line still arrive, within a millisecond; the Uno counts whole ones.
+        # Bytes already on the line still arrive within a millisecond; the Uno counts whole milliseconds.
         board.sleep(timeout_s + 0.003)
         assert board.valves == 0, lives
         assert board.state == "fault", lives
@@ -73,7 +73,7 @@ def test_sigkill(kills, figure):
         figure(f"{kills} SIGKILLs: vented at most {longest_s * 1000:.0f} ms after the last byte; time-out 300 ms")
 
 
-# Starts what walks, from its main thread or from another that ends; argv: port, what walks, what SIGHUP does, which.
+# Start a walking host from the main thread or one that ends; argv: port, host, SIGHUP's handler, which thread.
 STARTS = """
 import signal, subprocess, sys, threading, time
 signal.signal(signal.SIGHUP, getattr(signal, sys.argv[3]))
@@ -91,7 +91,7 @@ time.sleep(60)
 
 @contextlib.contextmanager
 def started_by_another(uno: PtyUno, hang_up: str, where: str):
-    """The program between, once what it started walks and the thread that started it has come to its end."""
+    """Yield the intermediate program once its child walks the robot and the thread that started the child has ended."""
     command = [sys.executable, "-c", STARTS, uno.device, HOST, hang_up, where]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, text=True, **pipes) as between:
@@ -106,7 +106,7 @@ def started_by_another(uno: PtyUno, hang_up: str, where: str):
                 os.kill(walking, signal.SIGKILL)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="prctl is Linux's")
+@pytest.mark.skipif(sys.platform != "linux", reason="prctl exists only on Linux")
 @pytest.mark.parametrize(
     ("hang_up", "where", "is_killed", "stops"),
     [

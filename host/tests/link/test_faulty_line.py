@@ -1,4 +1,4 @@
-"""Uploads over a line that damages bytes, with restarts of the Uno in the middle: the old set or the new one,
+"""Uploads over a line that damages bytes, with the Uno restarting in the middle, leave the old set or the new one,
 never another.
 
 `make soak` prints the table of docs/protocol.md (test_a_thousand_uploads).
@@ -15,20 +15,20 @@ from harness.board import Board
 from harness.chip import Chip
 from harness.faulty_line import FaultyLine
 
-# probability of a bad byte: probability that the Uno restarts in the middle of what is sent at once
+# probability of a bad byte: probability that the Uno restarts in the middle of a write
 RESTARTS = {1e-4: 3e-3, 1e-3: 3e-3, 1e-2: 2e-3, 1e-1: 1e-4}
 RATES = tuple(RESTARTS)
 BASELINE = {p.name: p.default for p in PARAMETERS}
 
 
 def random_set(rng: random.Random) -> dict[str, float]:
-    """A set in which every parameter is changed, except the one that would vent the robot."""
+    """Random values for all parameters except `host_timeout_s`, which would vent the robot."""
     values = {p.name: from_wire(p.name, rng.randint(p.minimum, p.maximum)) for p in PARAMETERS}
     return {**values, "host_timeout_s": 0.0}
 
 
 class Restarts:
-    """Restarts the Uno in the middle of what is sent, now and then."""
+    """A transport that occasionally restarts the Uno in the middle of a write."""
 
     def __init__(self, board, rng: random.Random, probability: float) -> None:
         self.board, self.rng, self.probability, self.count, self.total = board, rng, probability, 0, 0
@@ -48,8 +48,8 @@ class Restarts:
 
 
 def wanted_set(board) -> dict[str, int]:
-    """What the Uno would say over a clean line: typed on its console."""
-    board.sleep(0.05)  # what hangs open of a frame ends
+    """The Uno's parameters in wire units, read through its console over a clean line."""
+    board.sleep(0.05)  # an unfinished frame times out
     board.write(b"\n")
     board.sleep(0.2)
     board.read(0)
@@ -60,7 +60,7 @@ def wanted_set(board) -> dict[str, int]:
 
 
 def upload_many(board, rate: float, uploads: int, seed: int, restarts: float = 0.0) -> dict[str, float]:
-    """Uploads until each is done or given up; checks after each one. Times in seconds, virtual."""
+    """Upload random sets until done or given up, and check the Uno's set after each. Times are virtual seconds."""
     rng = random.Random(seed)
     restarting = Restarts(board, rng, restarts)
     line = FaultyLine(restarting, rate, seed)

@@ -1,4 +1,4 @@
-"""Frames: against the oracles, and damaged by the million."""
+"""Frames compared with independent implementations, and damaged by the million."""
 
 import binascii
 import random
@@ -123,7 +123,7 @@ def test_an_overlong_line_loses_nothing_where_it_is_cut():
 
 
 def damaged_once(data: bytes) -> Iterator[bytes]:
-    """`data` with one byte replaced, dropped, doubled or invented: every place, every value."""
+    """`data` with one byte replaced, dropped, doubled or inserted, at every position and with every value."""
     for at in range(len(data)):
         yield data[:at] + data[at + 1 :]
         yield data[: at + 1] + data[at:]
@@ -133,7 +133,7 @@ def damaged_once(data: bytes) -> Iterator[bytes]:
 
 
 def states_of_the_receiver() -> Iterator[bytes]:
-    """What may have arrived before a stop: text, a whole frame, any beginning of one and of a stop."""
+    """Input that may precede a stop: text, a whole frame, and every prefix of a frame and of a stop."""
     frame = frames.encode(COMMANDS["save"], 7, (b"startup\0\0\0\0\0",), SESSION)
     yield from (b"", b"set period_s 4", frame, b"\0" + bytes(range(1, 33)))
     yield from (frame[:length] for length in range(1, len(frame)))
@@ -148,7 +148,7 @@ def test_a_stop_survives_any_single_damaged_byte():
 
 
 def damage(count: int, seed: int) -> list[int]:
-    """[damaged, accepted as sent, accepted wrongly, taken for a stop]"""
+    """Counts of frames [damaged, accepted as sent, accepted wrongly, taken for a stop]."""
     rng, stride = random.Random(seed), 64
     pool = bytearray()
     for _ in range(500):
@@ -164,7 +164,7 @@ def damage(count: int, seed: int) -> list[int]:
 def test_damaged_frames_are_never_taken_for_others():
     damaged, as_sent, wrong, _ = damage(300_000, 1)
     assert damaged == 300_000
-    assert as_sent > 1000  # undamaged ones in between still get through
+    assert as_sent > 1000  # undamaged frames in between still get through
     assert wrong == 0
 
 

@@ -1,6 +1,6 @@
 """libFuzzer with address and undefined-behaviour sanitizers on frames, console lines and EEPROM images.
 
-20 seconds a target here, five minutes in `make soak`. Needs clang++ with libFuzzer (`tools/system-packages.sh fuzz`).
+20 seconds per target here, five minutes in `make soak`. Needs clang++ with libFuzzer (`tools/system-packages.sh fuzz`).
 """
 
 import os
@@ -31,7 +31,7 @@ def build(target: str) -> Path:
 
 
 def seeds(folder: Path) -> Path:
-    """A corpus to begin with: every command, every message."""
+    """An initial corpus with every command and every message."""
     folder.mkdir()
     lines = [f"{usage.split('[')[0]}\n" for _, usage, _ in CONSOLE_COMMANDS]
     lines += [f"set {p.name} 1.5\nshow {p.name}\n" for p in PARAMETERS] + ["save a\nload a\nforget a\nrun\n!clear\n"]

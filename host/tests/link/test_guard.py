@@ -1,4 +1,4 @@
-"""A host that is killed, or hangs, while the robot walks: the Uno vents by itself, whatever the command was."""
+"""When the host is killed or hangs while the robot moves, the Uno vents by itself, whatever the command was."""
 
 import os
 import signal
@@ -59,10 +59,10 @@ def test_a_timeout_that_is_chosen_counts_and_is_kept_alive(board, connected, tim
 
 @pytest.mark.parametrize("replace", ["set host_timeout_s 0", "load obstacle", "save fast"])
 def test_nothing_ends_the_guard(board, connected, replace):
-    """Neither no time-out, nor a preset that has none, nor a save, within which the host may be killed."""
+    """A time-out of 0, a preset without one, or a save (during which the host may be killed) does not disable it."""
     connected.hold("body", "positive")
     assert type_line(connected, replace, board)[-1] == "ok"
-    assert connected.get("host_timeout_s") == 0.0, "what is saved is what was chosen"
+    assert connected.get("host_timeout_s") == 0.0, "the saved value is the chosen one"
     board.sleep(GUARD_S - 0.1)
     assert board.valves != 0
     board.sleep(0.2)
@@ -93,7 +93,7 @@ def test_a_command_that_is_killed_leaves_no_valve_on(uno, gait, tmp_path, comman
             uno.wait(0.05)
             assert program.poll() is None
         uno.wait(3.0)
-        assert uno.board.state == "running", "as long as it lives, it is fed"
+        assert uno.board.state == "running", "a live host keeps the robot walking"
     finally:
         program.send_signal(signal.SIGKILL)
         program.wait()

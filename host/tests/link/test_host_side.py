@@ -58,7 +58,7 @@ def test_what_the_uno_says_by_itself_outlasts_the_next_line_typed():
         uno.connect()
         uno.session.lines.clear()  # its greeting
         uno.run()
-        uno.stop()  # reads on until the Uno has confirmed it, and so takes in what it says of it
+        uno.stop()  # reads until the Uno has confirmed the stop, and so receives the message about it
         assert type_line(uno, "show period_s", board) == [
             "[stopped: all valves off until clear", "[period_s 5.7 s (0.5 to 60 s, default 5.7 s)", "ok"]  # fmt: skip
 
@@ -67,13 +67,13 @@ SAMPLE = {"state": 0, "pressure_mpsi": (0, 0, 0), "phase": (0, 0, 0), "command":
 
 
 def heard(uno: Uno, number: int) -> None:
-    """The sample of that number arrives, as it looks on the wire."""
+    """Deliver the sample of that number as it appears on the wire."""
     wire = {"sequence": number % 65536, "time_us": (number * 10_000 + 3_000) % 2**32}
     uno.session.on_sample(Report("sample", number % 256, SAMPLE | wire))
 
 
 class HostClock:
-    """A host's clock that is set."""
+    """A host's clock, set by the test."""
 
     now_s = 0.0
 
@@ -84,7 +84,7 @@ class HostClock:
 @settings(deadline=None)
 @given(st.lists(st.integers(1, 420_000), min_size=1, max_size=20), st.integers(0, 2**20), st.booleans())
 def test_a_pause_is_counted_however_long_it_was(gaps, first, is_asleep):
-    """Up to 70 minutes, which is 6 times round the number and nearly once round the time, with the host asleep."""
+    """Pauses up to 70 minutes wrap the number 6 times and the time nearly once, even if the host's clock stops."""
     clock = HostClock()
     uno = Uno(Board(), clock)
     number = first
@@ -93,7 +93,7 @@ def test_a_pause_is_counted_however_long_it_was(gaps, first, is_asleep):
         number += gap
         clock.now_s += 0.0 if is_asleep else gap * 0.01
         heard(uno, number)
-        heard(uno, number)  # a repeat
+        heard(uno, number)  # a duplicate
     samples = uno.taken_samples()
     assert [b.sequence - a.sequence for a, b in itertools.pairwise(samples)] == gaps
     assert [b.time_us - a.time_us for a, b in itertools.pairwise(samples)] == [10_000 * gap for gap in gaps]
@@ -105,7 +105,7 @@ def test_time_goes_on_after_a_pause(pause_s):
     clock = HostClock()
     uno = Uno(Board(), clock)
     for number in (0, 1, 100 * pause_s, 100 * pause_s + 1):
-        clock.now_s = number * 0.01 * 1.005  # an Uno's clock is good to 0.5 %
+        clock.now_s = number * 0.01 * 1.005  # an Uno's clock is accurate to 0.5 %
         heard(uno, number)
     assert [sample.time_us // 10_000 for sample in uno.taken_samples()] == [0, 1, 100 * pause_s, 100 * pause_s + 1]
     assert uno.counters.lost == 100 * pause_s - 2
@@ -124,7 +124,7 @@ def test_lost_samples_are_counted():
 
 def test_samples_that_come_with_the_answer_are_counted_from_where_the_stream_begins():
     class Batches(Board):
-        """As USB hands bytes on: those of some milliseconds at once."""
+        """Bytes arrive in batches of some milliseconds, as over USB."""
 
         def read(self, timeout_s: float) -> bytes:
             self.sleep(0.016)
@@ -139,7 +139,7 @@ def test_samples_that_come_with_the_answer_are_counted_from_where_the_stream_beg
         assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
         uno.stream(False)
         uno.taken_samples()
-        board.sleep(700.0)  # more samples than 16 bits count
+        board.sleep(700.0)  # more samples than a 16-bit number counts
     assert uno.counters.lost == 0
 
 
@@ -159,7 +159,7 @@ def test_the_clock_relation_keeps_its_bound(drift, offset_s, seed):
 
 @pytest.mark.parametrize("jump_s", [1786.0, 60.0, 0.5, -0.5, -1786.0])
 def test_a_clock_that_jumps_voids_what_was_exchanged_before(jump_s):
-    """A host that slept: its clock stood (or was set on), and the exchanges before contradict those after."""
+    """After the host slept or its clock was set, the exchanges before the jump contradict those after it."""
     relation, here_s = ClockRelation(), 0.0
     for i in range(63):
         jumped_s = jump_s if i >= 50 else 0.0
@@ -173,7 +173,7 @@ def test_a_clock_that_jumps_voids_what_was_exchanged_before(jump_s):
 @given(st.lists(st.floats(-3e-3, 3e-3), min_size=3, max_size=20))
 @settings(max_examples=40, deadline=None)
 def test_exchanges_that_contradict_one_another_widen_the_bound(wobbles):
-    """Whatever they are off by, some line is within the bound of what each of them says."""
+    """Whatever their errors, one line lies within the bound of every exchange."""
     relation = ClockRelation()
     for i, wobble_s in enumerate(wobbles):
         relation.add(100.0 + i + wobble_s - 1e-6, float(i), 100.0 + i + wobble_s + 1e-6)

@@ -1,4 +1,4 @@
-"""The link of the real image, in the simulated chip."""
+"""The link to the real image, running in the simulated chip."""
 
 import itertools
 import math
@@ -23,7 +23,7 @@ def connected(**options) -> tuple[Chip, Uno]:
 
 
 def flood(rng: random.Random, size: int) -> bytes:
-    """Whole frames and lines, good and bad, at the line's full rate."""
+    """Complete frames and lines, good and bad, at the line's full rate."""
     data = b""
     while len(data) < size:
         kind = rng.randrange(4)
@@ -40,7 +40,7 @@ def flood(rng: random.Random, size: int) -> bytes:
 
 @pytest.mark.parametrize("stop", [b"!", STOP_FRAME[:-1]], ids=["byte", "frame"])
 def test_a_stop_in_a_flood(stop):
-    """The stop frame acts with its last byte, before its delimiter."""
+    """In a flood of input, a stop acts with its last byte, a stop frame before its delimiter."""
     chip, uno = connected(keep_events=True)
     rng = random.Random(6)
     worst_s = 0.0
@@ -108,7 +108,7 @@ def test_a_set_takes_over_at_the_cycle_boundary():
 
 
 def test_a_committed_set_shows_10_to_20_ms_after_the_boundary():
-    """It is taken over with the first sample past the boundary; the sample after that is made under it."""
+    """A set is applied with the first sample past the boundary; the sample after that one is the first to show it."""
     _, uno = connected()
     uno.upload({"period_s": 1.237})
     uno.run()
@@ -119,7 +119,7 @@ def test_a_committed_set_shows_10_to_20_ms_after_the_boundary():
         samples = uno.samples(0.1)
         while not 1 < samples[-1].phase_rad[0] < 5:
             samples = uno.samples(0.02)
-        uno.upload({"duty_body": 0.0})  # positive throughout, where it was vacuum after the boundary
+        uno.upload({"duty_body": 0.0})  # always positive; was vacuum after the boundary
         while uno.status().is_set_pending:
             samples += uno.samples(0.02)
         samples += uno.samples(0.05)
@@ -139,7 +139,7 @@ def test_a_set_on_the_console_acts_at_once():
     chip, uno = connected()
     uno.run()
     chip.sleep(1.0)
-    assert chip.valves() & 0b11 == 0b10  # the body at vacuum, until half of the 5.7 s
+    assert chip.valves() & 0b11 == 0b10  # the body at vacuum, for the first half of the 5.7 s
     line = b"set duty_body 0\n"
     chip.write(line)
     chip.sleep(len(line) * 40e-6 + 0.02)
@@ -217,7 +217,7 @@ def test_clocks_are_related_within_their_bound():
             host = uno.clock_relation.to_host(sample.time_us / 1e6)
             errors.append((host.time_s, host.bound_s, sample.time_us / 1e6))
         chip.sleep(0.3)
-    # The simulated Uno's clock is the host's: a sample's time differs from it by the time before the timer starts.
+    # Both clocks are the simulation's; the Uno's lags by the time until its timer starts.
     lead = chip.now() - uno.session.call("read_clock")["time_us"] / 1e6
     assert all(abs(host_s - uno_s - lead) < bound_s + 0.003 for host_s, bound_s, uno_s in errors)
     assert 0 < uno.clock_relation.bound_s < 0.002

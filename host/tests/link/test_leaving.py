@@ -1,4 +1,4 @@
-"""However one leaves, the robot stands; and where nobody can know that it does, it is said."""
+"""However a program leaves, the robot is stopped; if that cannot be confirmed, the user is warned."""
 
 import contextlib
 import random
@@ -16,7 +16,7 @@ from harness.faulty_line import FaultyLine
 
 
 class Line(Board):
-    """A board whose line can be cut: `swallow` takes what is written, `gone` ends all."""
+    """A board whose line can fail: `swallow` may drop a write, `gone` removes the port."""
 
     gone = False
     swallow = staticmethod(lambda data: False)
@@ -51,7 +51,7 @@ def walk(uno: Uno, board: Board) -> None:
 
 
 def walk_until(board: Board, end) -> None:
-    """Walk; then comes `end(uno)`, and one leaves."""
+    """Walk, call `end(uno)`, and leave."""
     with Uno(board, board) as uno:
         walk(uno, board)
         end(uno)
@@ -67,7 +67,7 @@ def talk(board: Board) -> None:
 
 
 def press_ctrl_c(board: Board, *moments: int) -> int:
-    """Talk, with Ctrl-C at those calls and lines of bifa.link; returns how many there were."""
+    """Talk, with Ctrl-C at the given trace events (calls and lines) of bifa.link; return the number of events."""
     passed = 0
 
     def trace(frame, event, _):
@@ -91,7 +91,7 @@ def press_ctrl_c(board: Board, *moments: int) -> int:
 def test_ctrl_c_at_any_moment_leaves_the_robot_standing(presses):
     moments, rng = press_ctrl_c(Board()), random.Random(1)
     assert moments > 3000
-    # The last ones are those of leaving itself: half of the presses go there, and another follows soon after.
+    # The last events belong to leaving: half of the presses fall there. A second press follows soon after each.
     for number in range(presses):
         first = rng.randrange(1, moments) if number % 2 else moments - rng.randrange(1, 800)
         board = Board()
@@ -117,7 +117,7 @@ def test_signals_mean_afterwards_what_they_meant_before(board, signals):
 
 
 class Dying:
-    """Ctrl-C while Python clears up, where it is dropped."""
+    """Ctrl-C in a finalizer, where Python drops the exception."""
 
     def __del__(self) -> None:
         signal.raise_signal(signal.SIGINT)
@@ -184,7 +184,7 @@ def test_every_end_waits_for_the_confirmation(board, ending):
 
     with pytest.raises(ending) if ending else contextlib.nullcontext():
         walk_until(board, end)
-    assert (board.valves, board.state) == (0, "stopped")  # without a moment's waiting
+    assert (board.valves, board.state) == (0, "stopped")  # already, without waiting
 
 
 @pytest.mark.parametrize("lost", [1, 3])
@@ -236,7 +236,7 @@ def test_ctrl_c_while_a_stop_is_not_confirmed_is_not_lost_either(board):
 
     with pytest.raises(StillMovingError) as told:
         walk_until(board, cut_off)
-    assert isinstance(told.value.__cause__, KeyboardInterrupt), "whoever tries again must not"
+    assert isinstance(told.value.__cause__, KeyboardInterrupt), "a caller that retries must see the Ctrl-C"
 
 
 def test_a_port_that_vanishes_from_a_walking_robot_is_said_aloud(board):

@@ -1,4 +1,4 @@
-"""Timed holds: all of them or none, and never without their end."""
+"""Timed holds are carried out all or not at all, and always to their end."""
 
 import math
 

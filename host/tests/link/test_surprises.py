@@ -1,4 +1,4 @@
-"""What the host makes of an Uno that says what no table knows, and of a call that was cut off."""
+"""How the host handles values unknown to its table, unexpected answers, and interrupted calls."""
 
 import struct
 from dataclasses import asdict
@@ -21,7 +21,7 @@ from harness.board import Board
 
 
 class Scripted(Board):
-    """A board whose frames pass through `alter(name, values)`; `interrupt_in`: raises in so many reads from now."""
+    """A board whose frames pass through `alter(name, values)`; the read number `interrupt_in` from now raises."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -55,7 +55,7 @@ def board() -> Scripted:
 
 
 def with_field(name: str, field: str, value: int):
-    """Alters one field of one message."""
+    """Return an `alter` that replaces one field of one message."""
     at = [f for f, count in REPORTS[name].fields for _ in range(count)].index(field)
 
     def alter(message: str, values: list) -> list:
@@ -88,7 +88,7 @@ def lasting() -> Uno:
 @settings(max_examples=30)
 def test_any_sample_can_be_shown_and_recorded(lasting, raw):
     uno = lasting
-    uno.connect()  # no sample came before
+    uno.connect()  # so that no sample precedes this one
     uno.session.on_sample(Report("sample", 0, frames.unpack(REPORTS["sample"], raw)))
     (sample,) = uno.taken_samples()
     assert sample.state in STATES or sample.state == f"unknown ({raw[6]})"
@@ -126,7 +126,7 @@ def test_an_interrupted_call_does_not_leave_its_answer_to_the_next(board, connec
 
 def test_an_interrupted_run_is_not_carried_out_later(board, connected):
     def cut(data: bytes) -> None:
-        raise KeyboardInterrupt  # before anything has left
+        raise KeyboardInterrupt  # before anything is sent
 
     write, board.write = board.write, cut
     with pytest.raises(KeyboardInterrupt):
@@ -165,7 +165,7 @@ def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(uno):
 
 @pytest.mark.parametrize("ask", [Uno.status, Uno.parameters, Uno.presets, Uno.exchange_clocks])
 def test_an_answer_of_another_kind_is_none(connected, ask):
-    """Each is asked again, and then said not to have been answered."""
+    """A request whose answers are all of another kind is repeated and then reported as unanswered."""
     take = connected.session.take
 
     def another(report, now_s):
@@ -177,7 +177,7 @@ def test_an_answer_of_another_kind_is_none(connected, ask):
 
 
 def test_a_session_with_the_key_of_the_one_before_is_another(board):
-    """Of the same seed; or by chance, where opening the port restarts no Uno."""
+    """Sessions may share a key, by the same seed or by chance, if opening the port does not restart the Uno."""
     for _ in range(2):
         uno = Uno(board, board, seed=1)
         uno.connect()
@@ -185,7 +185,7 @@ def test_a_session_with_the_key_of_the_one_before_is_another(board):
 
 
 def test_an_uno_that_greets_before_any_session_is_said_to_have_restarted(board, connected):
-    """Another program has a session with it; this one has not connected yet."""
+    """A greeting from an Uno in session with another program counts as a restart before this one has connected."""
     session = Session(board, board)
     board.write(frames.encode(COMMANDS["version"], 0, (), frames.OPEN_SEED))
     session.poll(0.1)

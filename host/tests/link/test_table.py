@@ -1,4 +1,4 @@
-"""The one table and what is generated from it do not drift apart."""
+"""The files generated from the table are in step with it."""
 
 import re
 import subprocess

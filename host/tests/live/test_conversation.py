@@ -1,4 +1,4 @@
-"""Whoever types at the console: lines in order, a stop past them all."""
+"""Console input: lines are carried out in order, and a stop overtakes them all."""
 
 import threading
 from types import SimpleNamespace
@@ -42,4 +42,4 @@ def test_a_stop_drops_what_was_typed_and_has_not_begun(held, capsys):
         printed = capsys.readouterr().out
         assert "-- not carried out: clear, run" in printed
         assert (board.state, board.valves) == ("stopped", 0)
-        assert "ok" in printed.splitlines(), "the line that had begun is answered"
+        assert "ok" in printed.splitlines(), "the line already begun is answered"

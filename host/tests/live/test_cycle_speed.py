@@ -1,4 +1,4 @@
-"""The speed that the page shows of a robot that is seen ten times a second."""
+"""The speed shown on the page for a robot observed ten times a second."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ GAIT = library.load("robust").gait
 
 @pytest.fixture(scope="module")
 def looks():
-    """Time, phase and place at looks that are a tenth of a second apart, more or less, over 9 cycles and a half."""
+    """Time, phase and position at irregular intervals of about 0.1 s, over 9.5 cycles."""
     draw = np.random.default_rng(0)
     time_s = np.cumsum(0.1 * (1.0 + 0.1 * draw.standard_normal(int(95 * GAIT.period_s))))
     place_mm = walk(nominal(), GAIT, time_s=np.append(0.0, time_s))["displacement_head_mm"][1:]

@@ -1,4 +1,4 @@
-"""Commands whose output goes nowhere: a full disk, a reader that has gone; the robot stands, and it is said."""
+"""Commands that cannot write their output (full disk, reader gone) stop the robot and report it."""
 
 import errno
 import os
@@ -22,7 +22,7 @@ def bifa(*arguments: str) -> list[str]:
 
 @pytest.fixture
 def onto_a_full_disk():
-    """Runs a command whose output goes there, and which ends in a sentence."""
+    """A function that runs a command with its output to /dev/full and checks that it ends in one error line."""
     if not FULL.exists():
         pytest.skip("no /dev/full here")
 
@@ -65,7 +65,7 @@ def test_who_walks_stops_once_nobody_can_read_it_any_more(uno, gait, command, tm
         walking.stdout.close()
         walking.stdout = None
         _, errors = walking.communicate(timeout=60)
-    assert (walking.returncode, errors) == (1, "")  # as any program whose reader has gone
+    assert (walking.returncode, errors) == (1, "")  # like any program whose reader has gone
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
 
 

@@ -1,4 +1,4 @@
-"""`bifa console` in a terminal, against the Uno's own code: what a person sees, and what becomes of the robot."""
+"""`bifa console` in a terminal, against the Uno's own code: what the user sees, and what the robot does."""
 
 import math
 import signal
@@ -29,7 +29,7 @@ def console(uno, tmp_path):
 
 
 def enters(console: Terminal, line: str, *answers: str, keys: str = "") -> None:
-    """Type a line (or the keys that make it); wait until it stands on the screen, and under it what is expected."""
+    """Type a line (or the keys that produce it); wait until it is on the screen with the expected answers below it."""
 
     def is_answered() -> bool:
         lines = console.look()
@@ -111,7 +111,7 @@ def test_a_stop_acts_as_it_is_pressed_also_while_the_uno_erases(console, uno):
 
 
 def close_window(console: Terminal) -> None:
-    console.program.ptyproc.delayafterclose = 3  # before pexpect kills
+    console.program.ptyproc.delayafterclose = 3  # before pexpect kills it
     console.program.close(force=False)
 
 
@@ -194,7 +194,7 @@ def test_several_lines_pasted_are_answered_in_order(console):
 
 
 def test_pyserials_miniterm_shows_answers_from_the_margin_on(uno, tmp_path):
-    """As it comes, without an option; `echo on` makes what is typed visible."""
+    """Miniterm needs no options: answers start at the left margin, and `echo on` makes input visible."""
     terminal = Terminal(tmp_path, program=("serial.tools.miniterm", uno.device, "250000"))
     with terminal:
         terminal.sees("--- Miniterm on")

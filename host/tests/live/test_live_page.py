@@ -19,7 +19,7 @@ expect = pytest.importorskip("playwright.sync_api", reason="playwright is not in
 
 LOOKS = (Path(__file__).parents[1] / "report" / "looks.js").read_text(encoding="utf-8")
 
-PATIENCE_MS = 60_000  # a prediction lets everything else go first
+PATIENCE_MS = 60_000  # predictions run at the lowest priority
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def tab(browser):
 
 
 def stop_on(page):
-    """Press its stop, until it says that the robot stands."""
+    """Press the page's Stop, and wait until it says that the valves are off."""
     page.get_by_role("button", name="Stop", exact=True).click()
     page.get_by_text("the Uno confirms that all valves are off").wait_for()
 
@@ -75,7 +75,7 @@ def test_a_slider_predicts_apply_changes_the_robot_and_stop_says_when_it_has(wal
     page.locator("input[name=period_s]").fill("4.5")
     expect(predicted).not_to_contain_text("10.8")
     expect(predicted).to_have_text(re.compile(r"predicts \d+\.\d\d mm/s.*; \d+\.\d\d mm of slip"), timeout=PATIENCE_MS)
-    assert walking.gait()["period_s"] == pytest.approx(5.7), "nothing changes before it is applied"
+    assert walking.gait()["period_s"] == pytest.approx(5.7), "the robot changes only on Apply"
     page.get_by_role("button", name="Apply").click()
     page.get_by_text("applied;").wait_for()
     assert walking.gait()["period_s"] == pytest.approx(4.5)
@@ -104,7 +104,7 @@ def test_a_robot_that_is_gone_is_said_and_waited_for_and_never_walks_by_itself(m
     bifa = monitor("--run", port=str(port), uno=first)
     page = tab(bifa.url)
     first.unplug()
-    expect(page.locator("#state")).to_have_text("the robot is gone")
+    expect(page.locator("#state")).to_have_text("the robot is disconnected")
     expect(page.locator("#alarm")).to_have_text(re.compile(f"^{port} is gone; plug the Uno in again"))
     assert page.locator("#alarm").evaluate("box => box.classList.contains('loud')")
     page.get_by_role("button", name="Stop", exact=True).click()
@@ -127,7 +127,7 @@ def test_a_server_that_ends_while_the_robot_is_gone_leaves_no_page_that_waits_fo
     bifa = monitor("--run")
     page = tab(bifa.url)
     bifa.uno.unplug()
-    expect(page.locator("#state")).to_have_text("the robot is gone")
+    expect(page.locator("#state")).to_have_text("the robot is disconnected")
     bifa.process.kill()
     expect(page.locator("#state")).to_have_text("not connected")
     expect(page.locator("#alarm")).to_contain_text("bifa monitor does not answer; the data shown are old.")
@@ -146,7 +146,7 @@ def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(monitor, tab):
     bifa = monitor("--run")
     page = tab(bifa.url)
     page.get_by_label("When the last page closes").uncheck()
-    page.get_by_text("the robot goes on").wait_for()
+    page.get_by_text("the robot keeps going").wait_for()
     page.close()
     time.sleep(4.5)
     assert bifa.uno.board.state == "running"
@@ -157,7 +157,7 @@ def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(monitor, tab):
     page.reload()
     page.wait_for_selector("html[data-drawn]", state="attached")
     time.sleep(4.5)
-    assert bifa.uno.board.state == "running", "a page that is loaded anew was not closed"
+    assert bifa.uno.board.state == "running", "a reloaded page does not count as closed"
     page.close()
     assert bifa.until("stopped")
     assert bifa.uno.board.valves == 0
@@ -170,7 +170,7 @@ def test_who_has_no_token_may_look_and_stop_and_nothing_else(walking, tab):
         assert page.get_by_role("button", name=name, exact=True).is_disabled()
     page.close()
     time.sleep(4.5)
-    assert walking.uno.board.state == "running", "who has no token comes and goes, and changes nothing"
+    assert walking.uno.board.state == "running", "a page without a token changes nothing by closing"
     page = tab(walking.origin)
     stop_on(page)
     assert (walking.uno.board.state, walking.uno.board.valves) == ("stopped", 0)
@@ -259,8 +259,8 @@ def test_who_hears_the_page_is_told_what_every_control_is(walking, tab):
     controls = re.findall(CONTROLS, heard)
     assert len(controls) >= 6 + 6 + 3 + 8
     assert [control for control in controls if not re.match(r'- \w+ "[^"]+"', control)] == []
-    assert len(re.findall(r"- (?:status|alert)\b", heard)) <= 5, "what is no news is not spoken"
-    assert not re.search(r"\d\.\d{5}", heard), "no phase of fifteen digits"
+    assert len(re.findall(r"- (?:status|alert)\b", heard)) <= 5, "only news is announced"
+    assert not re.search(r"\d\.\d{5}", heard), "numbers are rounded"
 
 
 def test_the_keyboard_alone_sets_a_gait_and_stops(walking, tab):
@@ -275,7 +275,7 @@ def test_the_keyboard_alone_sets_a_gait_and_stops(walking, tab):
         if reached[-1] == "period_s":
             page.keyboard.press("ArrowRight")
         assert len(reached) < 30
-    assert reached[:2] == ["stop", "period_s"], "to stop is first"
+    assert reached[:2] == ["stop", "period_s"], "Stop comes first"
     page.keyboard.press("Enter")
     page.get_by_text("applied;").wait_for()
     assert walking.gait()["period_s"] > 5.7

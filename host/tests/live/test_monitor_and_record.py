@@ -1,4 +1,4 @@
-"""`bifa monitor` and `bifa record` against the Uno's own code: what is seen, and what is kept when the port goes."""
+"""`bifa monitor` and `bifa record` against the Uno's own code: what is shown, and what is kept if the port vanishes."""
 
 import _thread
 import csv
@@ -33,7 +33,7 @@ def test_the_monitor_shows_the_robot_and_ctrl_c_turns_the_valves_off(uno, gait, 
         terminal.presses("\x03")
         assert terminal.exit_status() == 0
         terminal.sees_line("valves off")
-        terminal.sees("running", "lost 0")  # the last picture stays
+        terminal.sees("running", "lost 0")  # the last frame stays on the screen
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
 
 
@@ -50,7 +50,7 @@ def test_the_trace_is_as_long_as_it_says():
     watch(Uno(board, board), board, Console(file=shown, width=80), 1.0, lambda uno: None)
     body = next(line for line in shown.getvalue().splitlines() if "body" in line)
     assert "last 0.9 s" in shown.getvalue()
-    assert body.count("▄") == 10  # one block, at 0 psi, each tenth of a second
+    assert body.count("▄") == 10  # one block, at 0 psi, per 0.1 s
 
 
 @pytest.mark.parametrize("width", [60, 80, 200])
@@ -91,7 +91,7 @@ def lost(recorded: list[dict]) -> int:
 
 
 def unplugged_then_ended(uno: PtyUno, out: Path, count: int) -> None:
-    """Somebody pulls the cable of the first Uno, and presses Ctrl-C while the second records: after so many rows."""
+    """Unplug the first Uno after `count` rows, and press Ctrl-C after `count` rows of the second."""
 
     def person() -> None:
         for number, act in ((1, uno.unplug), (2, _thread.interrupt_main)):
@@ -138,8 +138,8 @@ def test_a_restart_never_walks_and_a_person_is_asked(uno, gait, tmp_path):
         terminal.sees("'clear' is not an answer here")
         driven_s = uno.driven_s
         uno.wait(3.0)
-        assert (uno.board.valves, uno.driven_s) == (0, driven_s), "it waits for the person"
-        assert len(rows(out / "telemetry_2.csv")) > 50, "and is recorded meanwhile"
+        assert (uno.board.valves, uno.driven_s) == (0, driven_s), "it waits for the user"
+        assert len(rows(out / "telemetry_2.csv")) > 50, "telemetry is recorded meanwhile"
         terminal.presses("\n")
         terminal.until(lambda: uno.board.state == "running")
         terminal.presses("\x03")
@@ -158,13 +158,13 @@ def test_where_nobody_can_be_asked_it_records_without_walking(tmp_path, gait, mo
     unplugged_then_ended(unos[0], tmp_path / "out", 100)
     record_telemetry(SameBoard(None, open_rig), tmp_path / "out", Path(gait), 120.0, Console(file=told, width=200))
     assert unos[0].driven_s > 0
-    assert unos[1].driven_s == 0, "another board, or the same one anew: it does not walk by itself"
+    assert unos[1].driven_s == 0, "a board that is plugged in does not walk by itself"
     assert "recording without walking, since no one can be asked" in told.getvalue()
     unos[1].unplug()
 
 
 def test_another_uno_is_not_taken_for_the_one_that_was_recorded(monkeypatch):
-    """By the serial number of its USB chip, wherever it is plugged in; the other one is not even opened."""
+    """The Uno is recognized by its USB serial number at any port; another one is not even opened."""
     plugged = [usb("/dev/ttyACM0", "A1")]
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: plugged)
     board = SameBoard(None, lambda port: port)
@@ -195,7 +195,7 @@ def test_a_recorder_opens_only_the_board_that_it_began_with(tmp_path, monkeypatc
 
 
 class Away:
-    """A board whose port is gone after a while."""
+    """A board whose port vanishes after 200 reads."""
 
     def __init__(self, board: Board) -> None:
         self._board, self._reads = board, 0

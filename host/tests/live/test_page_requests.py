@@ -1,4 +1,4 @@
-"""What the live page's server makes of requests that its page would not send."""
+"""How the live page's server handles requests that its page would not send."""
 
 import http.client
 import socket
@@ -41,7 +41,7 @@ def port(live):
 
 @pytest.fixture
 def page(live, port):
-    """Open a page; with the token unless another is given."""
+    """A function that opens a page, with the server's token unless another is given."""
     opened = []
 
     def open_page(token=live.token, **headers):
@@ -96,7 +96,7 @@ def test_what_makes_no_sense_is_refused_with_what_would_and_the_page_is_heard_on
     one = page()
     assert told in one.answer(one.ask(do, **more))["error"]
     assert live.state.content["stops_when_closed"]
-    assert "goes on" in one.answer(one.ask("closing", stop=False))["said"]
+    assert "keeps going" in one.answer(one.ask("closing", stop=False))["said"]
     assert not live.state.content["stops_when_closed"]
 
 
@@ -121,7 +121,7 @@ def test_a_stop_needs_no_token_and_all_else_does(page, port, live, token):
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null"])
 def test_a_page_from_elsewhere_is_not_heard(page, port, live, origin):
-    """Of another site, or from a file."""
+    """Requests from a page of another site or from a file are refused."""
     one = page(live.token, Origin=origin)
     assert list(one.messages(5)) == []
     assert one.closed is not None
@@ -136,7 +136,7 @@ def test_strangers_make_room_for_whoever_comes(port, page):
     try:
         begun_s = time.monotonic()
         assert posted(port, "stop") == 200
-        assert time.monotonic() - begun_s < 4.0, "before the strangers' own time is over"
+        assert time.monotonic() - begun_s < 4.0, "before the idle connections time out"
         assert owner.answer(owner.ask("stop"))["said"]
         gone = [one for one in idle if _is_closed(one)]
         assert len(idle) - len(gone) <= MOST_STRANGERS
@@ -154,7 +154,7 @@ def test_who_never_ends_his_headers_is_left_after_a_while(port):
 
 
 def test_who_does_not_read_the_page_does_not_make_the_server_hold_it(port, live):
-    """The page goes out in pieces as it is read: what waits for a reader who never reads is a piece or two."""
+    """The page is sent in pieces as it is read, so that a client that never reads holds back only one or two."""
     with socket.create_connection(("127.0.0.1", port), timeout=20) as slow:
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         slow.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")

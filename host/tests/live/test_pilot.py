@@ -1,4 +1,4 @@
-"""Who talks to the robot: requests of other threads, and a stop that comes before all of them."""
+"""The thread that talks to the robot: it serves the requests of other threads, and a stop overtakes them all."""
 
 import json
 import math
@@ -13,7 +13,7 @@ from harness.board import Board
 
 
 def flown(during, seconds=0.5, begin=lambda uno: None, board=None, position_mm=None):
-    """A flight of the Uno's own code; `during(pilot, report)` is called with every report. Reports, and the board."""
+    """Fly the Uno's own code, calling `during(pilot, report)` for every report; return pilot, reports and board."""
     board, reports = board or Board(), []
     pilot = Pilot()
 
@@ -124,13 +124,13 @@ def test_nothing_is_heaped_up_before_the_robot_and_its_own_time_is_kept():
         asked.extend(pilot.ask(lambda uno: uno.get("period_s")) for _ in range(100))
 
     _, _, board = flown(during, 2.0)
-    assert 2.0 <= board.now() < 4.0, "asked without end, it still lands"
+    assert 2.0 <= board.now() < 4.0, "it ends in time despite endless requests"
     refused = [future for future in asked if isinstance(future.exception(0), BusyError)]
-    assert refused, "the hundredth is told at once that it comes too late"
+    assert refused, "excess requests are refused at once"
 
 
 def test_a_stop_waits_for_nobody_who_writes():
-    """One thread sits in a write that does not come to its end (a jammed port); the stop goes out all the same."""
+    """A stop is sent even while another thread is blocked in a write to a jammed port."""
     sent, stuck = threading.Event(), threading.Event()
     pilot = Pilot()
     board = Board()
@@ -157,7 +157,7 @@ def test_a_stop_waits_for_nobody_who_writes():
 
 
 class Deaf(Board):
-    """No stop comes through to it while it is deaf, and its valves stay on."""
+    """A board that receives no stop while it is deaf; its valves stay on."""
 
     is_deaf = False
 
@@ -178,7 +178,7 @@ def test_a_stop_that_is_not_confirmed_ends_the_flight_loudly_where_nobody_watche
             board.is_deaf = True
             asked.append(pilot.stop("the last page was closed"))
         if is_watched and report.get("stopped") and report["stopped"]["is_confirmed"] is False:
-            board.is_deaf = False  # its deafness has been told, and it can be landed
+            board.is_deaf = False  # the failure has been reported; now the robot can be stopped
 
     flying = nullcontext() if is_watched else pytest.raises(StillMovingError, match="MAY STILL BE MOVING")
     with flying:

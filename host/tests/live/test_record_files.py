@@ -1,4 +1,4 @@
-"""The files of `bifa record`: their numbers, and what a full disk leaves of them; lost samples of walks."""
+"""The files of `bifa record`: numbering, what a full disk leaves of them, and lost samples of walks."""
 
 import errno
 
@@ -30,5 +30,5 @@ def test_a_walk_with_lost_samples_is_tried_again_and_then_refused(monkeypatch):
     monkeypatch.setitem(experiments.RUNS, "locomotion", lambda *_: ({}, {}, lost.pop(0)))
     planned = PlannedTrial("locomotion", pressure_psi=8.5, gait=BASELINE, cycles=1)
     assert experiments.record_trial(None, None, planned).columns == {}
-    with pytest.raises(BifaError, match="3 times over: 1 samples were lost"):
+    with pytest.raises(BifaError, match="3 attempts: 1 samples were lost"):
         experiments.record_trial(None, None, planned)

@@ -1,4 +1,4 @@
-"""`bifa record` on a rig with motion capture: resumed on another day, and by one program at a time."""
+"""`bifa record` on a rig with motion capture: resumable on another day, and by one program at a time."""
 
 import re
 
@@ -18,7 +18,7 @@ def test_a_recording_is_resumed_on_another_day(rig, tmp_path, monkeypatch):
     out = tmp_path / "walks"
     monkeypatch.setattr("time.strftime", lambda *form: "2026-11-25")
     record_walks(rig, "virtual", out, None, 1, 1, Console(quiet=True))
-    out.rename(out.with_name("walks.partial"))  # as where the second of two walks was interrupted
+    out.rename(out.with_name("walks.partial"))  # as if interrupted in the second of two walks
     monkeypatch.setattr("time.strftime", lambda *form: "2026-11-26")
     record_walks(rig, "virtual", out, None, 1, 2, Console(quiet=True))
     dataset = read_dataset(out)
@@ -42,9 +42,9 @@ def test_a_recording_is_a_data_set(tmp_path):
     command = ["record", "--out", str(out), "--port", "virtual", "--cycles", "2", "--repeats", "2"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
-    assert f"look at it with: bifa check '{out}'\n" in done.output  # in one line, to be copied
+    assert f"check it with: bifa check '{out}'\n" in done.output  # on one line, so that it can be copied
     trials = read_dataset(out).trials
     assert [trial.experiment for trial in trials] == ["locomotion"] * 2
     told = [int(samples) for samples in re.findall(r"walk \d: samples (\d+)  lost 0", done.output)]
-    # each walk's own, and some before and after it
+    # those of the walk, and some before and after it
     assert all(len(trial.time_s) <= count < 1.5 * len(trial.time_s) for trial, count in zip(trials, told, strict=True))

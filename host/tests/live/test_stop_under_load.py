@@ -1,4 +1,4 @@
-"""The page's stop while strangers keep the server busy: within 100 ms at the port, whatever they do."""
+"""The page's stop reaches the port within 100 ms, whatever strangers do to keep the server busy."""
 
 import itertools
 import subprocess
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.real_time
 WITHIN_S = 0.1
 FLOOD_S = 4.0
 
-# What strangers do, each in a program of its own for FLOOD_S: bounded in time and in connections.
+# What strangers do, each in its own program for FLOOD_S; bounded in time and number of connections.
 FLOODS = {
     "requests that are never read": """
         one.sendall(b"GET / HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\n\\r\\n" * 50)
@@ -55,7 +55,7 @@ while time.monotonic() < until:
 
 
 class Flood:
-    """Two programs that come to the server as often as they can."""
+    """Two programs that connect to the server as often as they can."""
 
     def __init__(self, port: int, what: str) -> None:
         code = _FLOOD.format(what=what.strip().replace("\n        ", "\n        "))
@@ -72,7 +72,7 @@ class Flood:
 
 
 class Watched(PtyUno):
-    """Notes when a stop arrived at the port."""
+    """An Uno on a pty that notes when a stop arrived at the port."""
 
     stopped_s = None
 
@@ -113,7 +113,7 @@ def test_a_stop_does_not_wait_for_what_is_predicted_of_the_sliders(bifa, figure)
 
     try:
         slide()
-        owner.until(lambda state: "predicted" in (state["prediction"] or {}))  # imported, drawn and compiled
+        owner.until(lambda state: "predicted" in (state["prediction"] or {}))  # by now imported, drawn and compiled
         taken = _stops(bifa, owner, slide)
     finally:
         owner.close()
@@ -122,7 +122,7 @@ def test_a_stop_does_not_wait_for_what_is_predicted_of_the_sliders(bifa, figure)
 
 
 def _stops(bifa, owner, meanwhile=lambda: None) -> list[float]:
-    """How long each of ten stops took to the port, in s; the robot is asked to stop whether it walks or not."""
+    """Time that each of ten stops took to reach the port, in s, whether or not the robot walks."""
     taken = []
     for _ in range(10):
         owner.until(lambda state: state["robot"] in ("running", "stopped"))

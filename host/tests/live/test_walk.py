@@ -1,4 +1,4 @@
-"""Walking unwatched: how far it is is told, and what ended it."""
+"""Walking without a monitor: progress and the reason for its end are reported."""
 
 import re
 
@@ -29,5 +29,5 @@ def test_a_robot_that_stops_by_itself_ends_it_with_its_state():
         def press(said: str) -> None:
             uno.send_stop()
 
-        with pytest.raises(LinkError, match=r"the robot stopped walking: it is stopped"):
+        with pytest.raises(LinkError, match=r"the robot stopped walking \(state: stopped"):
             walk(uno, board, 5.0, press)

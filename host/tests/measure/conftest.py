@@ -1,4 +1,4 @@
-"""The virtual bench's Uno."""
+"""The Uno of the virtual bench."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from bifa.link import Uno
 
 @pytest.fixture
 def uno(rig):
-    """Connected."""
+    """The bench's Uno, connected."""
     with Uno(rig.transport, rig.clock, seed=1) as uno:
         uno.connect()
         yield uno

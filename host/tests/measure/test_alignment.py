@@ -1,4 +1,4 @@
-"""An instrument's clock is lined up with the Uno's by the mark in the strobe, lost samples and all."""
+"""An instrument's clock is aligned with the Uno's by the mark in the strobe, even if samples are lost."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def instrument(strobes_s, offset_s, drift, jitter_s=0.0, seed=1):
 
 
 def edges_from(start_s, offset_s=12.0, drift=1e-3, jitter_s=0.0, seed=1):
-    """Edges that an instrument sees which starts at `start_s` of the Uno's clock, and the numbers of their samples."""
+    """Edges seen by an instrument that starts at `start_s` of the Uno's clock, and their sample numbers."""
     seen = NUMBERS[has_strobe(NUMBERS) & (start_s <= STROBES_S)]
     return instrument(PERIOD_S * seen, offset_s, drift, jitter_s, seed), seen
 
@@ -35,7 +35,7 @@ def is_paired_rightly(clock, edges_s, numbers, within_s):
 
 
 @given(
-    start=st.floats(0.0, 55.0) | st.integers(0, 55),  # samples before the mark's pause at which it starts; on a sample
+    start=st.floats(0.0, 55.0) | st.integers(0, 55),  # in periods; between samples or on one
     offset_s=st.floats(-1e4, 1e4),
     drift=st.floats(-5e-3, 5e-3),
     jitter_s=st.sampled_from([0.0, 2e-5, 3e-4]),
@@ -117,7 +117,7 @@ def test_a_record_that_does_not_cover_the_experiment_is_not_completed(first_s, l
     assert resampled(within, camera_s, np.sin(camera_s)) == pytest.approx(np.sin(within), abs=0.02)
 
 
-# -- what is missing is not made up ----------------------------------------------------------------------------
+# -- missing data are not invented -----------------------------------------------------------------------------
 
 UNO_S = np.arange(0.0, 8.0, 0.01)
 CAMERA_S = np.arange(-0.1, 8.1, 0.01) + 0.003
@@ -138,7 +138,7 @@ def test_rows_that_are_missing_are_followed_over_two_and_refused_beyond(first, l
     keep[first : first + length] = False
     within = CAMERA_S[first - 1] < UNO_S[-1]
     if length > 2 and within and first + length < len(keep):
-        with pytest.raises(AlignmentError, match=r"hole.*not filled in; repeat|ends .* too early"):
+        with pytest.raises(AlignmentError, match=r"gap.*not filled in; repeat|ends .* too early"):
             resampled(UNO_S, CAMERA_S[keep], SEEN_MM[keep])
     elif length <= 2:
         found = resampled(UNO_S, CAMERA_S[keep], SEEN_MM[keep])
@@ -150,7 +150,7 @@ def test_a_lost_marker_is_a_hole_whatever_the_camera_wrote(lost):
     values = SEEN_MM.copy()
     values[330:380] = values[329] if lost == "held" else lost
     values[600:630] = values[599] if lost == "held" else lost
-    with pytest.raises(AlignmentError, match=r"2 holes|1 hole"):
+    with pytest.raises(AlignmentError, match=r"2 gaps|1 gap"):
         resampled(UNO_S, CAMERA_S, values)
 
 

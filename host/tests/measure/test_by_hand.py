@@ -1,4 +1,4 @@
-"""A lab's own instruments as files: announced, recorded, shown, kept or repeated; on the real firmware."""
+"""A lab's own instruments, read from files: trials are announced, recorded, shown, kept or repeated (real firmware)."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.uno
 
 
 class Bench:
-    """A virtual bench whose instruments only a lab's files tell of."""
+    """A virtual bench whose instruments are known only through the files that a lab saves."""
 
     def __init__(self, folder, **lab):
         self.watch, self.said = folder / "files", []
@@ -29,7 +29,7 @@ class Bench:
         class Attended(Desk):
             def answer(self):
                 bench.lab.look()
-                bench.spoken_s.append(bench.rig.clock.now())  # the question stands
+                bench.spoken_s.append(bench.rig.clock.now())  # the question is on the screen
                 return super().answer()
 
         self.counted, self.spoken_s = [], []
@@ -72,7 +72,7 @@ def test_files_give_the_same_trials_as_instruments_that_are_driven(bench, rig, t
         assert check_trial(ours) == []
         for name, values in ours.columns.items():
             if not name.startswith("command") and name != "time_s":
-                # not its peak: where a pull slips lies between two samples, 4 N apart
+                # the median, not the peak: a pull slips between two samples that are 4 N apart
                 assert np.median(values) == pytest.approx(np.median(theirs.columns[name]), abs=0.6)
     step = by_hand.trials[1]
     assert step.extra["switch_time_s"][0] == pytest.approx(0.5, abs=0.02)
@@ -99,7 +99,7 @@ def test_each_trial_is_announced_shown_and_kept_with_its_files(bench, tmp_path):
 def test_whatever_takes_its_time_is_counted_down_with_what_the_robot_does(bench, tmp_path):
     here = bench()
     here.run(tmp_path / "day", PLAN)
-    assert np.diff(here.spoken_s).max() < 1.0, "nobody waits in silence"
+    assert np.diff(here.spoken_s).max() < 1.0, "the user is never left without news"
     counted = {}
     for what, left_s in here.counted:
         counted.setdefault(what, []).append(left_s)
@@ -117,7 +117,7 @@ def test_whatever_takes_its_time_is_counted_down_with_what_the_robot_does(bench,
 
 
 def at_first(spoil):
-    """What spoils the first record only, and the files that were saved."""
+    """A function that spoils only the first record, and the list of files saved so far."""
     saved = []
 
     def once(asked, record):
@@ -141,7 +141,7 @@ def test_what_looks_wrong_is_said_and_the_trial_repeated_on_request(bench, tmp_p
 def test_what_seems_to_be_a_mistake_is_said_while_it_can_be_put_right(bench, tmp_path):
     here = bench(spoil=lambda asked, record: record | {"force_N": -record["force_N"]})
     here.run(tmp_path / "day", (PULL,))
-    assert "where a resistance is positive: does the load cell count the other way?" in "\n".join(here.said)
+    assert "but a resistance is positive: does the load cell count the other way?" in "\n".join(here.said)
 
 
 def test_a_file_that_cannot_be_read_is_named_and_waited_for_again(bench, tmp_path):

@@ -1,4 +1,4 @@
-"""Questions at the bench: answered by lines at the terminal or by a file in the watched folder."""
+"""Questions at the bench are answered by a line at the terminal or a file in the watched folder."""
 
 import os
 import sys
@@ -16,7 +16,7 @@ from harness.waiting import until
 
 @pytest.fixture
 def terminal(monkeypatch):
-    """Writes what somebody types at a terminal."""
+    """A function that types at a terminal."""
     master, slave = os.openpty()
     stdin = os.fdopen(slave)
     monkeypatch.setattr(sys, "stdin", stdin)
@@ -27,7 +27,7 @@ def terminal(monkeypatch):
 
 @pytest.fixture
 def typed(monkeypatch):
-    """Writes what somebody types, as into a pipe; b"" ends it."""
+    """A function that writes to stdin through a pipe; b"" closes it."""
     out, into = os.pipe()
     stdin = os.fdopen(out)
     monkeypatch.setattr(sys, "stdin", stdin)
@@ -76,7 +76,7 @@ def test_an_input_that_has_ended_is_nobody_unless_a_folder_is_watched(typed, tmp
 
 
 def test_a_program_without_an_input_is_answered_by_the_folder_alone(monkeypatch, tmp_path):
-    monkeypatch.setattr(sys, "stdin", None)  # as under <&-, or with pythonw
+    monkeypatch.setattr(sys, "stdin", None)  # as with `<&-` or pythonw
     watching = mounting(watch=tmp_path)
     (tmp_path / "answer").write_text("r\n")
     assert watching.answer() == "r"

@@ -1,4 +1,4 @@
-"""A lab's own instrument: its CSV lined up with the Uno's telemetry, and every way in which that can fail."""
+"""A lab's own instrument: its CSV is aligned with the Uno's telemetry, or refused with the reason."""
 
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -24,7 +24,7 @@ from harness.exports import EXPORTS, MACHINES, preset_of
 
 PULL = PlannedTrial("anchor_pull", None, 8.5, 20.0)
 OFFSET_S, DRIFT = 37.2, 4e-5  # instrument = OFFSET_S + (1 + DRIFT) * (Uno's time)
-RESTART_S = 1.6  # of silence before the Uno's time 0
+RESTART_S = 1.6  # without edges, before the Uno's time 0
 MARKED = 130
 
 
@@ -38,8 +38,8 @@ def own(uno_s):
 
 @pytest.fixture(params=["marked", "restarted"])
 def files(tmp_path, request):
-    """An instrument that ran through a restart of the Uno: 3 s of edges, silence, 8 s of edges; the pull at 4 s. With a
-    mark in the strobe, or as telemetry was before there were marks."""
+    """Files of an instrument that ran through a restart of the Uno: 3 s of edges, silence, 8 s of edges; a pull at 4 s.
+    Telemetry with a mark in the strobe, or in the older form without marks."""
     numbers = np.arange(1, 800)
     if request.param == "marked":
         numbers = numbers[has_strobe(numbers)]
@@ -50,7 +50,7 @@ def files(tmp_path, request):
     force = np.minimum(5.0 * pulled, 28.0)
     write(tmp_path / "pull.csv", {"time_s": own(machine), "displacement_mm": pulled, "force_N": force})
     uno = np.arange(100, 790) * 0.01
-    pressure = np.where(uno < 5.0, 8.5, 7.5)  # a mark in the Uno's time: 1 s into the pull
+    pressure = np.where(uno < 5.0, 8.5, 7.5)  # an event in the Uno's time, 1 s into the pull
     telemetry = {"time_s": uno, "sequence": np.arange(100, 790)}
     telemetry |= {f"pressure_{c}_psi": pressure for c in ("body", "head", "tail")}
     if request.param == "marked":
@@ -71,12 +71,12 @@ def test_the_two_records_are_brought_onto_one_clock(files):
     assert clock.rms_s < 1e-5
     began = trial.time_s[np.flatnonzero(trial.columns["displacement_mm"] > 0.05)[0]]
     dropped = trial.time_s[np.flatnonzero(trial.columns["pressure_psi"] < 8.0)[0]]
-    assert dropped - began == pytest.approx(1.0, abs=0.021)  # one sample of the machine
+    assert dropped - began == pytest.approx(1.0, abs=0.021)  # one sample period of the machine
     assert trial.extra["clock_error_s"] < 1e-4
 
 
 def another(files, name, shift_mm):
-    """The pull once more, by another record."""
+    """A second record of the pull, shifted by `shift_mm`."""
     header, *rows = (files / "pull.csv").read_text().splitlines()
     moved = [row.split(",") for row in rows]
     text = [f"{time_s},{float(mm) + shift_mm},{force}" for time_s, mm, force in moved]
@@ -106,7 +106,7 @@ def test_what_is_refused_when_it_is_added_changes_nothing(files):
     telemetry = (files / "telemetry_1.csv").read_text()
     for other_pressure in ("8.500000", "8.400000"):
         (files / "telemetry_1.csv").write_text(telemetry.replace("8.500000", other_pressure))
-        with pytest.raises(DatasetError, match=r"already, as anchor_8\.5psi_20mm_s_1\.csv"):
+        with pytest.raises(DatasetError, match=r"already in .*, as anchor_8\.5psi_20mm_s_1\.csv"):
             import_trial(files / "pull.csv", files, PULL, folder, add=True)
     second = another(files, "second", 0.1)
     with pytest.raises(BifaError, match=r"dataset\.toml.*--known"):
@@ -122,7 +122,7 @@ STEP = PlannedTrial("step_response", "large", 8.5)
 
 
 def filmed(files, camera_s, moves_s):
-    """In place of the pull a step that is commanded at 2.5 s and seen by a camera."""
+    """Replace the pull by a step that is commanded at 2.5 s and filmed by a camera."""
     write(files / "cam.csv", {"time_s": own(camera_s), "displacement_mm": 50.0 * (camera_s > moves_s)})
     (files / "pull.sync.csv").rename(files / "cam.sync.csv")
     header, *rows = (files / "telemetry_1.csv").read_text().splitlines()
@@ -170,7 +170,7 @@ def sync(edges_s):
 
 
 def with_cell(cell):
-    """The displacement in line 41 replaced."""
+    """Return a function that replaces the displacement in line 41."""
 
     def spoil(text):
         lines = text.splitlines()
@@ -201,7 +201,7 @@ LINE_41 = r"pull\.csv, line 41, column displacement_mm: "
         ("pull.sync.csv", sync(own([*np.arange(-5.0, -2.0, 0.01), *SCATTERED_S])), r"pull\.sync\.csv"),
         ("telemetry_1.csv", "time_s,sequence\n1,2\n2,3\n", "pressure_body_psi"),
         ("telemetry_1.csv", lambda text: text.replace(",200.000000,", ",,"), "column sequence: no value"),
-        ("telemetry_1.csv", with_a_hole, r"the telemetry has a hole of 2\.00 s at 4\.50 s"),
+        ("telemetry_1.csv", with_a_hole, r"the telemetry has a gap of 2\.00 s at 4\.50 s"),
         ("pull.csv", table((1, 2, 2, 3)), "line 4, column time_s: not later"),
         ("pull.sync.csv", "sync_time_s\n1\n3\n2\n", "line 4, column sync_time_s: not later"),
         ("pull.csv", table().replace(",", ";"), "separated by semicolons"),
@@ -224,7 +224,7 @@ def test_a_file_that_cannot_be_used_is_named_with_what_to_do(files, file, spoilt
 
 def test_missing_files_are_named(files):
     (files / "pull.sync.csv").unlink()
-    with pytest.raises(DatasetError, match=r"pull\.sync\.csv is missing: it says when the strobe .* declare where"):
+    with pytest.raises(DatasetError, match=r"pull\.sync\.csv is missing: its one column.* the strobe .* declare where"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
@@ -242,7 +242,7 @@ def test_the_first_edge_after_a_restart_is_sample_1():
             samples += uno.samples(0.1)
         edges = rig.instruments.stop()["sync_time_s"]
         since = edges[np.flatnonzero(np.diff(edges) > 0.015)[-1] + 1 :]
-        stopped_s = rig.clock.now() - uno.clock_relation.offset_s  # on the Uno's clock, to its bound
+        stopped_s = rig.clock.now() - uno.clock_relation.offset_s  # on the Uno's clock, within its bound
         expected = int(np.floor(stopped_s / 0.01))
         assert samples[0].time_us == samples[0].sequence * 10_000
         assert uno.clock_relation.bound_s < 0.004
@@ -284,7 +284,7 @@ def test_telemetry_without_commands_is_no_steps(files):
 def test_rows_of_a_camera_that_are_missing_are_named_with_file_and_column(files):
     camera_s = np.arange(-2.0, 7.9, 0.01)
     camera = filmed(files, camera_s[(camera_s < 3.2) | (camera_s > 3.7)], 3.45)
-    with pytest.raises(DatasetError, match=r"cam\.csv, column displacement_mm: .*hole.*0\.51 s.*not filled in"):
+    with pytest.raises(DatasetError, match=r"cam\.csv, column displacement_mm: .*gap.*0\.51 s.*not filled in"):
         import_trial(camera, files, STEP, files / "out")
 
 
@@ -297,7 +297,7 @@ def declared(text):
 
 
 def pulled(files):
-    """The columns of the pull, and the edges."""
+    """The columns of the pull and the strobe's edges."""
     return read_instrument(files / "pull.csv", ("displacement_mm", "force_N"))
 
 
@@ -331,7 +331,7 @@ def test_a_code_for_a_missing_value_is_seen_in_the_files_own_unit(files, unit, m
     (files / "pull.sync.csv").rename(files / "odd.sync.csv")
     more = "offset = { displacement_mm = 3.0 }\n"
     export = declared(FORM.replace('displacement_mm = "mm"', f'displacement_mm = "{unit}"') + more)
-    if unit == "um":  # 0.999 mm
+    if unit == "um":  # 0.999 mm, a plausible value
         import_trial(files / "odd.csv", files, PULL, files / "out", export=export)
         return
     with pytest.raises(DatasetError, match="line 42, column displacement_mm: 999 is a code for a missing value"):
@@ -358,7 +358,7 @@ def test_a_clock_of_dates_has_its_edges_as_dates(files):
 
 @pytest.mark.parametrize("files", ["marked"], indirect=True)
 def test_frames_that_the_strobe_triggers_line_themselves_up(files):
-    """The camera's own stamps show the pause; it is frame-exact, and no second file is needed."""
+    """The camera's own time stamps show the pause, exact to the frame, so that no second file is needed."""
     _, edges = pulled(files)
     (files / "take.csv").write_text("t,x,F\n" + "".join(f"{t:.6f},{20 * max(0, t - 40):.4f},1\n" for t in edges))
     export = declared(FORM + 'sync = "frames"\n')
@@ -368,7 +368,7 @@ def test_frames_that_the_strobe_triggers_line_themselves_up(files):
     frames = FORM.replace('time_s = "s"', 'time_s = "frame"') + 'sync = "frames"\nrate_hz = 100\n'
     text = "t,x,F\n" + "".join(f"{k},{20 * max(0, k / 100 - 5):.4f},1\n" for k in range(len(edges)))
     (files / "take.csv").write_text(text)
-    with pytest.raises(DatasetError, match="pause"):  # counted frames hide it: nothing tells which is which
+    with pytest.raises(DatasetError, match="pause"):  # frame counts hide the pause, so frames cannot be assigned
         import_trial(files / "take.csv", files, PULL, files / "other", export=declared(frames))
 
 

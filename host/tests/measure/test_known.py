@@ -1,4 +1,4 @@
-"""What a data set says is known comes from the rig or from the person, and from nowhere else."""
+"""A data set's known values come only from the rig or the user."""
 
 from types import SimpleNamespace
 

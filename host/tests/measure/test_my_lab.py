@@ -1,4 +1,4 @@
-"""The example of docs/campaign.md: a lab's own drivers as a rig, found by its entry point, measures."""
+"""The example of docs/campaign.md, a rig of a lab's own drivers found by its entry point, measures."""
 
 import shutil
 import sys
@@ -60,7 +60,7 @@ def vendor(stand) -> ModuleType:
 
 @pytest.fixture
 def installed(rig, tmp_path, monkeypatch):
-    """The example as pip leaves it, on a bench whose serial port is the virtual Uno's."""
+    """The example as installed by pip, on a bench whose serial port leads to the virtual Uno."""
     project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
     shutil.copy(EXAMPLE / "my_lab.py", tmp_path)
     info = tmp_path / "my_lab-1.dist-info"

@@ -1,4 +1,4 @@
-"""What is typed or saved at the bench and is not this trial's record: said, and asked for again."""
+"""Input and files at the bench that are not this trial's record are reported, and the record is requested again."""
 
 import re
 from functools import partial
@@ -18,7 +18,7 @@ from harness.waiting import PATIENCE_S, until
 
 
 class Typing(Desk):
-    """A desk at which these lines are typed, each in answer to a question."""
+    """A desk at which the given lines are typed, one per question."""
 
     def __init__(self, say, *lines):
         super().__init__(say)
@@ -34,7 +34,7 @@ def said():
 
 
 def recorded(own, kept):
-    """Have a pull mounted, started and its record asked for."""
+    """Mount and start a pull, and request its record."""
     own.begin(Turn(PlannedTrial("anchor_pull", None, 8.5, 20.0), 2, 2), kept)
     own.mount("anchor_pull")
     own.start()
@@ -66,7 +66,7 @@ SYNC = "sync_time_s\n" + "".join(f"{0.01 * k:.2f}\n" for k in range(100))
 
 @pytest.fixture
 def watching(said, tmp_path):
-    """Instruments that wait for the record of a pull, and how they are declared."""
+    """A function that returns instruments waiting for a pull's record, declared as given, and the watched folder."""
 
     def begin(declaration=""):
         folder = tmp_path / "records"
@@ -81,7 +81,7 @@ def watching(said, tmp_path):
 
 
 def looked(own, condition=lambda: False, seconds=2.0):
-    """Look as a session does, until there is a record or something is so; False if it is not in time."""
+    """Poll as a session does, until there is a record or `condition` holds; False if neither in time."""
     return until(lambda: own.ready or bool(condition()), seconds)
 
 
@@ -115,18 +115,18 @@ def test_a_workbook_is_seen(watching, said):
 @pytest.mark.parametrize(
     ("file", "says"),
     [
-        ("pull.csv", r"pull\.csv is there; pull\.sync\.csv .* is not, yet"),
-        ("pull.sync.csv", r"pull\.sync\.csv is there; the record that it belongs to is not, yet"),
-        ("pull.xlsx", r"pull\.xlsx is there, but a record .* ends with \.csv.*`bifa instrument \S*/pull\.xlsx`"),
-        ("pull.c3d", r"pull\.c3d is there, but"),
-        ("below/pull.CSV", r"pull\.CSV is there; pull\.sync\.csv"),
+        ("pull.csv", r"pull\.csv, but not yet pull\.sync\.csv .* beside it"),
+        ("pull.sync.csv", r"pull\.sync\.csv, but not yet the record that it belongs to"),
+        ("pull.xlsx", r"pull\.xlsx, but a record .* ends with \.csv.*`bifa instrument \S*/pull\.xlsx`"),
+        ("pull.c3d", r"pull\.c3d, but a record"),
+        ("below/pull.CSV", r"pull\.CSV, but not yet pull\.sync\.csv"),
     ],
 )
 def test_what_has_come_and_cannot_be_used_is_said_within_two_seconds_and_once(watching, said, file, says):
     own, folder = watching()
     (folder / file).parent.mkdir(exist_ok=True)
     (folder / file).write_text("1\n2\n")
-    assert looked(own, lambda: said), "nothing was said"
+    assert looked(own, lambda: said), "nothing was reported"
     assert re.search(says, said[0])
     assert not looked(own, lambda: len(said) > 1, 0.7)
 
@@ -147,7 +147,7 @@ def test_what_systems_leave_behind_is_no_record(watching, said, stray):
 
 
 def test_who_looks_is_not_kept_while_a_large_file_is_read(watching, said, monkeypatch):
-    """The Uno has to hear of its host meanwhile, or it vents what is held."""
+    """Polling does not block on a large file: the Uno must keep hearing from its host, or it vents."""
     asked, told = Event(), Event()
 
     def read_at_length(*given):

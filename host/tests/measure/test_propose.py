@@ -1,4 +1,4 @@
-"""`bifa instrument`: what is seen in an export is proposed, asked about, proved on the file, and only then declared."""
+"""`bifa instrument` proposes what it detects in an export, asks, verifies it on the file, and only then declares it."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def exported(folder, name, role):
     ("name", "role"), [*((name, "machine") for name in MACHINES), *((name, "camera") for name in CAMERAS)]
 )
 def test_how_an_export_is_written_is_seen_without_its_preset(tmp_path, name, role):
-    """And the preset is recognised."""
+    """The form of an export is detected without its preset, and the matching preset is recognised."""
     path = exported(tmp_path, name, role)
     seen = look(path)
     assert seen.presets[role] == preset_of(name)
@@ -75,7 +75,7 @@ def test_a_preset_that_fits_is_offered_and_kept_short(tmp_path):
     (tmp_path / "bench.toml").write_text("[known]\nhead_mass_kg = 0.18\n")
     said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "file", "y")
     assert said.exit_code == 0, said.output
-    assert "read by the preset testxpert" in said.output
+    assert "matches the preset testxpert" in said.output
     assert "⠐" in said.output or "*" in said.output or "⣀" in said.output, "each column is plotted"
     text = (tmp_path / "bench.toml").read_text()
     assert text == '[known]\nhead_mass_kg = 0.18\n\n[instrument.machine]\npreset = "testxpert"\n'
@@ -105,7 +105,7 @@ def test_where_a_declaration_cannot_be_written_is_said_before_anything_is_asked(
     for bench in (tmp_path / "nowhere" / "bench.toml", path):
         said = CliRunner().invoke(app, ["instrument", str(path), "--bench", str(bench)])
         assert isinstance(said.exception, TargetError)
-        assert "Whose file" not in said.output
+        assert "Which instrument wrote it" not in said.output
 
 
 @pytest.mark.parametrize("above", ["", "sep=;\n", "Specimen;silicone 3\n", "\nBench;Monday;2\n"])

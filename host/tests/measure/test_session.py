@@ -1,4 +1,4 @@
-"""Sessions on the virtual bench: the real firmware, instruments with clocks of their own, interruptions."""
+"""Sessions on the virtual bench: real firmware, instruments with their own clocks, interruptions."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -49,7 +49,7 @@ def test_every_experiment_is_recorded_as_the_format_wants_it(recorded):
 
 @pytest.mark.uno
 def test_the_set_point_is_noted_as_the_converter_makes_it(recorded):
-    """8.5 psi is 267.8 counts, and the Uno rounds down: a fit that took 8.5 would find a sensor out of calibration."""
+    """8.5 psi is 267.8 counts, which the Uno rounds down; a fit using 8.5 would find a sensor out of calibration."""
     pull = recorded[0].of("anchor_pull")[0]
     assert pull.pressure_psi == 8.5
     assert pull.columns["pressure_psi"].mean() == pytest.approx(pull.extra["set_point_psi"], abs=0.01)
@@ -58,14 +58,14 @@ def test_the_set_point_is_noted_as_the_converter_makes_it(recorded):
 
 @pytest.mark.uno
 def test_clocks_are_lined_up_so_that_pressure_and_displacement_belong_together(recorded):
-    """The actuator snaps when its pressure does: an instrument that was off by a sample would show it."""
+    """The actuator snaps as its pressure dips, so an instrument off by a sample would be noticed."""
     dataset, _ = recorded
     step = dataset.of("step_response")[0]
     switches = step.extra["switch_time_s"]
     assert switches[1] - switches[0] == pytest.approx(STEP_DOWN_S - STEP_UP_S)
     changes = step.time_s[np.flatnonzero(np.diff(step.columns["command"])) + 1]
     assert 0.0 < step.extra["switch_error_s"] <= 0.0026
-    since = changes - switches - PRESSURES_AFTER_S  # the row is the pressures', the command the strobe's before
+    since = changes - switches - PRESSURES_AFTER_S  # a row is stamped for its pressures; its command is the strobe's
     assert ((since >= 0.0) & (since <= 0.0101)).all()
     rising = (step.time_s > switches[0]) & (step.time_s < switches[1])
     speed = np.gradient(step.columns["displacement_mm"], step.time_s)
@@ -82,14 +82,14 @@ def test_a_stand_that_cannot_pull_backward_is_not_taken_to_have_done_so(rig, uno
 
 @pytest.mark.uno
 def test_valves_switch_when_the_record_of_a_walk_has_them_switch(rig, uno):
-    """Held against the edges of the pins in the simulated chip. The Uno switches at whole ticks, so that single edges
-    are off by half a tick either way, and on the average none."""
+    """Modelled switching times match the pin edges of the simulated chip. The Uno switches at whole ticks, so single
+    edges are off by up to half a tick, but their mean is not."""
     planned = PlannedTrial("locomotion", gait=Gait(3.1234, 263.3, 97.7, 0.47, 0.53, 0.61), cycles=4)
     trial = record_trial(bench_of(rig), uno, planned)
     pins = [event for event in rig.uno.iter_events() if event.kind == "pin"]
     edges_s = np.array([event.cycle / CLOCK_HZ for event in pins if event.index in VALVE_PINS])
     strobes_s = np.array([event.cycle / CLOCK_HZ for event in pins if event.index == STROBE_PIN and event.value])
-    seen_s = strobes_s[strobes_s > edges_s[0]][0]  # the strobe of the first sample that knows of the run
+    seen_s = strobes_s[strobes_s > edges_s[0]][0]  # the strobe of the first sample taken during the run
     edges_s = (edges_s - seen_s + trial.time_s[0] - PRESSURES_AFTER_S) * seconds_per_uno_s(trial)
     modeled_s = valves_of(walk_timeline(trial), trial).time_s
     modeled_s = modeled_s[modeled_s < trial.time_s[-1] - 0.1]
@@ -182,7 +182,7 @@ def test_the_pipes_slope_is_a_setting_of_walks_only():
 
 
 def test_a_quick_session_measures_what_a_verdict_needs():
-    """Each condition twice, for the noise, and of each experiment one that is never fitted, for the verdict."""
+    """A quick session repeats each condition, for the noise floor, and has a held-out one per experiment."""
     trials = session(quick=True)
     assert len(trials) == 30
     spared = spare(Dataset(None, "quick", {}, tuple(planned.as_trial() for planned in trials)))
@@ -190,7 +190,7 @@ def test_a_quick_session_measures_what_a_verdict_needs():
 
 
 def first_strobe_s(rig):
-    """When the board's first strobe rises, on the bench's own clock: nobody has counted yet."""
+    """Time of the board's first strobe on the bench's clock, before any sample has been counted."""
     rig.instruments.start()
     clock = rig.instruments.clock
     rig.clock.sleep(0.05)
@@ -204,7 +204,7 @@ def true_s(clock, own_s):
 @pytest.mark.uno
 @pytest.mark.parametrize("seed", range(4))
 def test_every_edge_is_the_sample_that_the_uno_says(seed):
-    """Ten starts of the instrument a millisecond apart, so that some fall onto a sample; judged by the bench's time."""
+    """Edges get the right sample for ten starts a millisecond apart, some of them on a sample, by the bench's clock."""
     with open_rig("virtual", profile="realistic", seed=seed) as rig, Uno(rig.transport, rig.clock) as uno:
         first_s = first_strobe_s(rig)
         uno_rate = rig.world.clock_hz / 16e6
@@ -229,7 +229,7 @@ def test_an_instrument_that_misses_the_mark_is_asked_to_repeat_and_then_it_is_sa
         return record | {"sync_time_s": record["sync_time_s"][30:]}
 
     rig.instruments.stop = deaf
-    said = r"anchor pull, 8\.5 psi.*3 times over: the sync edges do not show the pause.*repeat"
+    said = r"anchor pull, 8\.5 psi.*3 attempts: the sync edges do not show the pause.*repeat"
     with pytest.raises(BifaError, match=said):
         record_trial(bench_of(rig), uno, PULL)
     assert len(tries) == 3
@@ -262,7 +262,7 @@ def test_a_session_is_resumed_with_the_same_settings_only(rig, tmp_path, change)
 
 @pytest.mark.uno
 def test_two_sessions_do_not_record_into_one_data_set(rig, tmp_path):
-    """The second is told who the first is, before anything moves."""
+    """The second session is refused before anything moves, and told who holds the data set."""
     with locked(tmp_path / "day"), pytest.raises(LockedError, match="is being written by"):
         run(rig, tmp_path / "day")
     assert rig.uno.time_s < 0.1

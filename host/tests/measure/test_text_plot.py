@@ -1,4 +1,4 @@
-"""A trial as a plot in text: as wide as the terminal lets it be."""
+"""A trial as a text plot that uses the terminal's width."""
 
 import numpy as np
 import pytest

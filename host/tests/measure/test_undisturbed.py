@@ -1,4 +1,4 @@
-"""A trial within which the robot was stopped, or tripped, is refused; on the real firmware and bench."""
+"""A trial during which the robot was stopped or a fault tripped is refused (real firmware, virtual bench)."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ TRIALS = (STATIC, replace(STATIC, pressure_psi=0.0), PULL, STEP, replace(WALK, c
 
 @pytest.fixture
 def recorded(rig, uno):
-    """Record a trial; `disturb(rig, uno)` is called once a share `at` of it is done."""
+    """A function that records a trial and calls `disturb(rig, uno)` once the share `at` of it is done."""
 
     def record(disturb, planned, at):
         due = [disturb]
@@ -38,7 +38,7 @@ def recorded(rig, uno):
 @pytest.mark.parametrize("planned", TRIALS, ids=lambda planned: planned.title)
 @pytest.mark.parametrize("at", [0.3, 0.85])
 def test_a_trial_within_which_somebody_stopped_the_robot_is_refused(recorded, planned, at):
-    at *= 0.55 if planned.experiment == "static_loading" else 1.0  # the share that its cross-head's motion ends at
+    at *= 0.55 if planned.experiment == "static_loading" else 1.0  # the share at which the cross-head's motion ends
     with pytest.raises((DisturbedError, RefusedError), match="stopped"):
         recorded(lambda rig, uno: uno.send_stop(), planned, at)
 
@@ -88,11 +88,11 @@ def test_valves_that_are_not_as_commanded_are_seen_and_the_dead_time_is_none():
 
 
 def test_a_gait_may_switch_before_its_first_sample():
-    """Valve latency, 800: 3 ms after its start a gait had switched the tail, which kept its first supply for 21."""
+    """Seen with valve latency, seed 800: the tail switched 3 ms after the start, but kept its supply for 21 ms."""
     off = (1.0, 0.0, 0.0)
     still, there = 0b011001, 0b101001
     refuse_disturbed([sample(k, command=off, valves=v) for k, v in enumerate((still, still, there))], "running")
-    with pytest.raises(DisturbedError, match=r"0\.03 s after it began .* tail to positive instead of vacuum"):
+    with pytest.raises(DisturbedError, match=r"0\.03 s after it began, .* tail to positive instead of vacuum"):
         refuse_disturbed([sample(k, command=off, valves=still) for k in range(4)], "running")
     held = {"body": "positive", "head": "vacuum", "tail": "vacuum"}
     with pytest.raises(DisturbedError, match=r"0\.00 s"):
@@ -109,7 +109,7 @@ def test_a_gait_whose_tail_switches_at_once_is_recorded(recorded):
 
 
 def test_a_chamber_that_is_switched_twice_at_once_keeps_its_supply_for_a_while():
-    """Choked flow, 500: a gait whose tail was switched 10 ms after its start ended the campaign."""
+    """Seen with choked flow, seed 500: a gait that switched the tail 10 ms after its start ended the campaign."""
     on, off = sample(0, command=(1.0, 0.0, 1.0)), (1.0, 0.0, 0.0)
     still, vented, there = 0b011001, 0b001001, 0b101001
     late = [sample(k, command=off, valves=valves) for k, valves in enumerate((still, still, vented, there), start=1)]

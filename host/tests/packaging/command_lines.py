@@ -1,4 +1,4 @@
-"""The command lines of the README, the docs, the workflows and the container: those in blocks and those in the text."""
+"""Command lines in code blocks and inline code of the README, the docs, the workflows and the container."""
 
 import json
 import re
@@ -18,7 +18,7 @@ _FIRST = re.compile(rf"(?:\S*/)?({'|'.join(PROGRAMS)})(?:\s|$)")
 
 @dataclass(frozen=True)
 class CommandLine:
-    """One command: its program without the folder, and its arguments. Of `a && b` each is one."""
+    """One command: its program without the folder, and its arguments. `a && b` counts as two commands."""
 
     page: str
     program: str
@@ -29,7 +29,7 @@ class CommandLine:
 
 
 def command_lines(root: Path) -> list[CommandLine]:
-    """All of them, each once a page. What names no argument of `make` or a tool is prose: "`bifa` talks to..."."""
+    """All command lines, without duplicates on a page. A program without arguments is prose: "`bifa` talks to..."."""
     pages = [root / "README.md", root / "host" / "lacuna" / "README.md", *sorted((root / ".github").glob("*.md"))]
     pages += sorted((root / "docs").rglob("*.md"))
     texts = [(page, text) for page in pages for text in _candidates(page.read_text("utf-8"))]
@@ -46,12 +46,12 @@ def command_lines(root: Path) -> list[CommandLine]:
 
 
 def workflows(root: Path) -> list[Path]:
-    """The files of the workflows."""
+    """Paths of the workflow files."""
     return sorted((root / ".github" / "workflows").glob("*.yml"))
 
 
 def steps(workflow: Path) -> list[dict]:
-    """The steps of all its jobs."""
+    """Steps of all jobs of a workflow."""
     return [step for job in yaml.safe_load(workflow.read_text("utf-8"))["jobs"].values() for step in job["steps"]]
 
 
@@ -65,7 +65,7 @@ def _candidates(text: str) -> Iterator[str]:
 
 
 def _commands(line: str) -> Iterator[list[str]]:
-    """The words of each command; optional ones, in brackets, are there, and assignments and `time` are not."""
+    """The words of each command, including optional ones in brackets, without assignments and `time`."""
     line = _COMMENT.sub("", line.strip()).replace("\\", "/")
     for part in re.split(r"&&|;", line):
         part = re.sub(r"^(?:time\s+|[A-Z_]+=\S+\s+)*", "", part.strip())

@@ -1,4 +1,4 @@
-"""Wheels of the three packages, and whether what they depend on can be installed."""
+"""Fixtures: wheels of the three packages, and whether their dependencies can be installed."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ def root() -> Path:
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory) -> dict[str, Path]:
-    """Package -> its wheel, built from its sdist."""
+    """Wheels by package, each built from its sdist."""
     import wheels
 
     image = wheels.IMAGE if wheels.IMAGE.is_file() else None
@@ -26,7 +26,7 @@ def built(tmp_path_factory) -> dict[str, Path]:
 
 @pytest.fixture(scope="session")
 def index() -> None:
-    """Skips where no package index answers."""
+    """Skip the test if no package index answers."""
     asked = [sys.executable, "-m", "pip", "index", "versions", "threadpoolctl"]
     if subprocess.run(asked, capture_output=True, check=False).returncode:
-        pytest.skip("no package index answers, from which to install what the wheels depend on")
+        pytest.skip("no package index answers; the wheels' dependencies cannot be installed")

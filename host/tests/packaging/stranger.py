@@ -1,4 +1,4 @@
-"""Somebody with an empty environment, in a folder that is no checkout."""
+"""A user with an empty environment, outside the checkout."""
 
 import os
 import re
@@ -13,7 +13,7 @@ from pathlib import Path
 
 
 class Stranger:
-    """Runs programs of an environment of its own, which sees nothing of the one that the tests run in."""
+    """Runs programs in an environment of its own, isolated from the tests' environment."""
 
     def __init__(self, folder: Path) -> None:
         subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
@@ -25,29 +25,29 @@ class Stranger:
         self._environ["PATH"] = f"{self._programs}{os.pathsep}{self._environ['PATH']}"
 
     def run(self, program: str, *arguments: str | Path) -> str:
-        """What it printed; a status other than 0 is a failure that shows it."""
+        """Run a program and return its output; a status other than 0 fails the test and shows it."""
         command = [self._programs / program, *arguments]
         done = subprocess.run(command, cwd=self.here, env=self._environ, capture_output=True, text=True, check=False)
         assert done.returncode == 0, f"{program} {arguments}: {done.stdout}\n{done.stderr}"
         return done.stdout
 
     def install(self, *what: str | Path) -> None:
-        """By pip, with what it depends on."""
+        """Install packages by pip, with their dependencies."""
         self.run("python", "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check", *what)
 
     def add_program(self, name: str, text: str) -> None:
-        """Put a script where the environment's programs are, before all others."""
+        """Add a script to the environment's programs, which come first on PATH."""
         (self._programs / name).write_text(text)
         (self._programs / name).chmod(0o755)
 
     @contextmanager
     def running(self, program: str, *arguments: str | Path, until: Callable[[], bool]) -> Iterator[None]:
-        """Run it beside what is done in here, which begins once `until` holds; then end it as Ctrl-C would."""
+        """Run a program in the background during the block, from when `until` holds; then end it as Ctrl-C would."""
         command = [self._programs / program, *arguments]
         with subprocess.Popen(command, cwd=self.here, env=self._environ, stdout=subprocess.DEVNULL) as beside:
             try:
                 while not until():
-                    assert beside.poll() is None, f"{program} has ended with status {beside.returncode}"
+                    assert beside.poll() is None, f"{program} ended with status {beside.returncode}"
                     time.sleep(0.05)
                 yield
             finally:

@@ -1,5 +1,5 @@
-"""Every command line of the README and the docs is one that its program understands. The quick ones are run; the other
-commands of bifa have tests that run them, with a simulated robot where the page's line needs a real one."""
+"""Every command line of the README and the docs is understood by its program. The quick ones are run here; the other
+commands of bifa are run by tests of their own, with a simulated robot where the page needs a real one."""
 
 import argparse
 import importlib.util
@@ -25,7 +25,7 @@ LINES = command_lines(ROOT)
 PLACEHOLDERS = {"METHOD": "de", "NAME": "turkish", "COMMAND": "gaits", "FOLDER": "folder", "FILE": "file.csv"}
 MAKEFILE = (ROOT / "Makefile").read_text("utf-8")
 
-# The tests that run a command with a robot, a board or data of their own.
+# Tests that run a command with their own robot, board or data.
 RUN_BY = {
     "campaign": "campaign/test_setup.py",
     "check": "check/test_recordings.py",
@@ -46,7 +46,7 @@ RUN_BY = {
     "simulate": "simulate/test_simulate_command.py",
     "upload": "cli/test_commands.py",
 }
-QUICK = (  # run here, as they stand
+QUICK = (  # run here unchanged
     "docs/gaits.md: bifa gaits",
     "docs/model.md: bifa simulate --inclination 90 --payload 0.1",
     "docs/building.md: make help",
@@ -55,11 +55,11 @@ QUICK = (  # run here, as they stand
 
 
 class UnderstoodError(Exception):
-    """Raised where a program has parsed its arguments, before it does anything with them."""
+    """Raised once a program has parsed its arguments, before it acts on them."""
 
 
 def test_there_are_command_lines():
-    """What reads the pages still finds them: some are known to be there."""
+    """The reader of the pages finds some command lines known to be there."""
     said = {str(line) for line in LINES}
     assert "README.md: make demo" in said
     assert "docs/adding-your-own-system.md: pip install ./host/lacuna" in said
@@ -69,7 +69,7 @@ def test_there_are_command_lines():
 
 @pytest.fixture
 def lay_out(tmp_path, monkeypatch):
-    """Lays out the files and folders that a line names, empty, in a working directory of its own."""
+    """A function that creates the files and folders named by a line, empty, in a new working directory."""
 
     def files_of(words):
         monkeypatch.chdir(tmp_path)
@@ -89,7 +89,7 @@ def test_the_program_is_there_and_understands_the_arguments(line, monkeypatch, l
 
 
 def understands(line: CommandLine, monkeypatch, lay_out) -> None:
-    """Whichever program it is."""
+    """Check that the line's program understands its arguments."""
     if line.program == "bifa":
         bifa_line(line, lay_out)
     elif line.program == "pip" or line.arguments[:2] == ("-m", "pip"):
@@ -101,7 +101,7 @@ def understands(line: CommandLine, monkeypatch, lay_out) -> None:
 
 
 def bifa_line(line: CommandLine, lay_out) -> None:
-    """What is only named, as in "`bifa fit` does this", needs no options."""
+    """Check a line of `bifa`. A command that is only named, as in "`bifa fit` does this", needs no options."""
     words = [PLACEHOLDERS.get(word, word) for word in line.arguments]
     lay_out(words[1:])
     group = typer.main.get_command(app)
@@ -117,7 +117,7 @@ def bifa_line(line: CommandLine, lay_out) -> None:
 @pytest.mark.parametrize("name", sorted({line.arguments[0] for line in LINES if line.program == "bifa"}))
 def test_some_test_runs_the_command(name):
     if name not in PLACEHOLDERS and not name.startswith("-"):
-        assert name in RUN_BY, "say above which tests run it"
+        assert name in RUN_BY, "add to RUN_BY the test that runs this command"
         assert f'"{name}"' in (HOST / "tests" / RUN_BY[name]).read_text("utf-8")
 
 
@@ -135,7 +135,7 @@ def test_make_has_the_target_and_its_program_understands_the_arguments(line, mon
 
 
 def pip_line(line: CommandLine) -> None:
-    """tests/packaging/test_wheels.py installs those of the project; jupyterlab is the only package of others."""
+    """Check a line of pip: packages of the project (installed by test_wheels.py), or jupyterlab."""
     action, *packages = (word for word in line.arguments if not word.startswith("-") and word != "pip")
     assert action == "install"
     for package in packages:
@@ -145,7 +145,7 @@ def pip_line(line: CommandLine) -> None:
 
 
 def python_line(line: CommandLine, monkeypatch) -> None:
-    """Its parser is asked; a program without one is given nothing."""
+    """Check a line of Python with the program's parser; a program without one takes no options."""
     words = [PLACEHOLDERS.get(word, word) for word in line.arguments]
     monkeypatch.syspath_prepend(HOST)
     monkeypatch.syspath_prepend(ROOT / "tools")

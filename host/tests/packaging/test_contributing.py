@@ -1,4 +1,4 @@
-"""What contributors and their tools read: the workflows, the hooks, the forms, the version."""
+"""Files for contributors and their tools: workflows, hooks, issue forms, version."""
 
 import re
 import subprocess
@@ -21,7 +21,7 @@ VERSION = bifa.__version__
 
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
 def test_each_step_uses_a_pinned_action_or_runs_what_is_there(workflow):
-    """What is run, test_command_lines.py checks like a page's command lines; but for the one script."""
+    """Each step uses a pinned action or runs an existing script; test_command_lines.py checks the other commands."""
     for step in steps(workflow):
         assert ("uses" in step) != ("run" in step)
         if "uses" in step:
@@ -67,7 +67,7 @@ def test_a_hook_calls_what_lint_calls(hook):
     "hook", [hook for hook in hooks() if hook["id"].startswith(("ruff", "generated"))], ids=lambda hook: hook["id"]
 )
 def test_a_hook_passes_on_this_tree(hook):
-    """With the files that it would get."""
+    """A hook passes on the files that pre-commit would give it."""
     program, *arguments = hook["entry"].split()
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
     files = [f for f in listed if re.search(hook["files"], f) and f.endswith(".py") and (ROOT / f).exists()]
@@ -103,7 +103,7 @@ def test_the_hook_refuses_a_message(tmp_path):
 
 
 def test_the_version_is_the_same_everywhere():
-    """schema/generate.py writes it where it can (tests/link/test_table.py); these are written by hand."""
+    """Versions written by hand agree; schema/generate.py writes the others (tests/link/test_table.py)."""
     assert lacuna.__version__ == virtual_robot.version.__version__ == VERSION
     assert f'"{VERSION}, protocol' in (ROOT / "lib/link/message_table.h").read_text("utf-8")
     assert yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))["version"] == VERSION

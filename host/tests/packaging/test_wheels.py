@@ -1,5 +1,4 @@
-"""What a stranger installs: wheels built from the sdists, outside the checkout. An editable installation hides what
-these lack."""
+"""Wheels built from the sdists work outside the checkout. (An editable installation hides what they lack.)"""
 
 import re
 import subprocess
@@ -21,10 +20,10 @@ from virtual_robot.uno.board import lib as chip
 FOLDERS = {"lacuna_engine": "lacuna", "bifa": "bifa", "virtual_robot": "virtual_robot"}
 BOUND = ("numpy", "scipy", "pandas", "numba", "matplotlib")
 OLDEST_PYTHON = pytest.mark.skipif(
-    sys.version_info >= (3, 12), reason="the oldest versions have no wheels for a newer Python than 3.11"
+    sys.version_info >= (3, 12), reason="the oldest versions have no wheels for Python newer than 3.11"
 )
 NOT_SHIPPED = {"LICENSE", "README.md", "pyproject.toml"}
-IMAGE = ("bifa/firmware/uno.hex", "bifa/firmware/uno.toml")  # which git does not know
+IMAGE = ("bifa/firmware/uno.hex", "bifa/firmware/uno.toml")  # not under version control
 IMPORT_ALL = """
 import importlib, pkgutil, sys
 package = importlib.import_module(sys.argv[1])
@@ -38,7 +37,7 @@ import pathlib, pandas
 tables = {path.name: pandas.read_csv(path) for path in sorted(pathlib.Path("records").iterdir())}
 assert [e.name for e in lacuna.diagnose(system, tables).effects] == [e.name for e in verdict.effects]
 """
-PAGE_S = 0.005  # the step of the page's simulate
+PAGE_S = 0.005  # time step of the page's `simulate`
 
 
 @pytest.mark.slow
@@ -65,7 +64,7 @@ def test_the_license_of_a_package_is_that_of_the_project(root, folder):
 @pytest.mark.slow
 @pytest.mark.parametrize("versions", [pytest.param("oldest", marks=OLDEST_PYTHON), "newest"])
 def test_the_wheels_work_in_an_empty_environment(root, built, index, tmp_path, versions):
-    """The engine first, by itself; then the robot's packages beside it."""
+    """The engine works by itself, and then together with the robot's packages."""
     stranger = Stranger(tmp_path)
     engine, *robots = (built[name] for name in FOLDERS)
     pinned = lowest([engine, *robots], *BOUND) if versions == "oldest" else []
@@ -81,7 +80,7 @@ def test_the_wheels_work_in_an_empty_environment(root, built, index, tmp_path, v
 
 
 def ten_minutes(root: Path, stranger: Stranger) -> None:
-    """The page's example as it stands, to its verdict and its report."""
+    """Run the page's example unchanged, to its verdict and its report."""
     page = (root / "docs" / "adding-your-own-system.md").read_text()
     code = re.search(r"## Ten minutes.*?```python\n(.*?)```", page, re.DOTALL)[1]
     assert 'verdict.report("report.html")' in page
@@ -98,7 +97,7 @@ def ten_minutes(root: Path, stranger: Stranger) -> None:
 
 
 def pushes(height_N: float, draw: np.random.Generator) -> np.ndarray:
-    """Columns of one record: a mass on a spring with dry friction, pushed to and fro."""
+    """Columns of one record: a mass on a spring with dry friction, pushed back and forth."""
     time_s = PAGE_S * np.arange(400)
     force_N = height_N * np.sin(2 * np.pi * time_s) * (time_s < 1.5)
     position_m, speed_m_s, found = 0.0, 0.0, []
@@ -111,7 +110,7 @@ def pushes(height_N: float, draw: np.random.Generator) -> np.ndarray:
 
 
 def commands_of_bifa(stranger: Stranger) -> None:
-    """A small data set checked and fitted, its model walked, the library listed."""
+    """Check and fit a small data set, simulate its model, and list the library of gaits."""
     write_dataset(stranger.here / "data", small_session(IndependentLab().with_seed(3)))
     save_gait(stranger.here / "gait.toml", BASELINE)
     assert "24 trials" in stranger.run("bifa", "check", "data")
@@ -122,11 +121,11 @@ def commands_of_bifa(stranger: Stranger) -> None:
 
 
 def flashed(stranger: Stranger) -> None:
-    """A program in avrdude's place keeps what it is given to write, and the simulated chip runs that. The board that
-    answers is the virtual robot, which runs the image that the wheel carries."""
+    """Flash with a stand-in for avrdude that keeps the image, and run that image in the simulated chip. The board that
+    answers is the virtual robot, which runs the image carried by the wheel."""
     stranger.add_program("avrdude", f'#!/bin/sh\ncp uno.hex "{stranger.here}/written.hex"\n')
     board = stranger.here / "board"
-    assert "carried by this installation" in stranger.run("bifa", "doctor")
+    assert "part of this installation" in stranger.run("bifa", "doctor")
     with stranger.running("bifa", "rig", "--link", board, until=board.exists):
         assert "answers on" in stranger.run("bifa", "flash", "--port", board)
     uno = Uno(stranger.here / "written.hex")

@@ -1,4 +1,4 @@
-"""A small day of the independent lab, and the robot as a system that it gives."""
+"""A small data set of the independent lab, and the robot as a system made from it."""
 
 from dataclasses import replace
 

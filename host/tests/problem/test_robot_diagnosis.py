@@ -1,6 +1,6 @@
-"""A few of the sealed data sets of `make blind`: the whole trial takes hours, these few some minutes.
+"""A few of the sealed data sets of `make blind`: the whole blind trial takes hours, these take minutes.
 
-`make test` runs a robot without an effect and one with one; the demo's test names another, through the firmware.
+`make test` runs a robot without an effect and a robot with one; the demo's test covers another, through the firmware.
 """
 
 import json
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 
 def diagnosed(folder, seed, *drawn):
-    """The diagnosis of a sealed data set of 45 trials, and what its label says."""
+    """The diagnosis of a sealed data set of 45 trials, and the effects on its label."""
     label = generate(seed, folder, *drawn)
     return diagnose(prepare(read_dataset(folder))), label.effects
 

@@ -1,4 +1,4 @@
-"""Learnt curves in the shape of something that the model knows do what that does."""
+"""Learnt curves with the shape of a known term or effect act as that term or effect."""
 
 from dataclasses import replace
 
@@ -83,7 +83,7 @@ def test_the_camera_reads_with_what_was_learnt(system, theta):
 
 @pytest.mark.parametrize(("experiment", "channel"), [("locomotion", "head"), ("step_response", "")])
 def test_a_camera_that_remembers_is_one_on_a_mount_that_rings(system, theta, experiment, channel):
-    omega, damping = 2.0 * np.pi * 6.0, 0.1  # dies away within what is remembered
+    omega, damping = 2.0 * np.pi * 6.0, 0.1  # decays within the memory
     swing, decay = omega * np.sqrt(1.0 - damping**2), damping * omega
 
     def after_a_step(ago_s):
@@ -106,7 +106,7 @@ def test_a_camera_that_remembers_is_one_on_a_mount_that_rings(system, theta, exp
 
 
 SWITCHED = ("step_response", "locomotion")
-# A curve (a row each where they differ), the effect of the library that does the same, and where it shows.
+# Of each site: a curve (one row each if they differ), the equivalent effect of the library, and where it shows.
 ALIKE = {
     "filling": ([lambda p: -0.05 * p], {"leak.rate_per_s": 0.05}, ("locomotion",)),
     "valves": ([lambda _: 0.03], {"valve_latency.delay_s": 0.03}, SWITCHED),

@@ -1,4 +1,4 @@
-"""When the valves switched, from columns that say it to 10 ms only."""
+"""Switch times of the valves, from columns sampled every 10 ms only."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def walk(gait, start_s=0.0, phases=None, **extra) -> Trial:
 
 
 def exact(gait, chamber, start_s=0.0):
-    """Every switch between the first and the last sample."""
+    """Times of all switches between the first and the last sample."""
     phases, duties = _of(gait)
     i = CHAMBERS.index(chamber)
     turns = np.arange(-2, 60)
@@ -53,7 +53,7 @@ gaits = st.fixed_dictionaries({name: RANGES[name[:3]] for name in GAIT})
 @given(gait=gaits, age_s=st.none() | st.floats(0.0, 0.009))
 @example(GAIT | {"period_s": 2.0, "psi13_deg": 120.0, "duty_tail": 1 / 3}, None)  # the tail switches at time 0
 def test_a_walk_switches_when_its_gait_says_not_when_the_sample_shows_it(gait, age_s):
-    """A row's time is that of its pressures; the commands are those of the strobe before, where their age is noted."""
+    """A row's time is that of its pressures; if the commands' age is noted, they are those of the strobe before."""
     trial = walk(gait)
     if age_s is not None:
         trial = replace(trial, columns=trial.columns | {"time_s": TIME + age_s}, extra={"command_age_s": age_s})

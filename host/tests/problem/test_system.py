@@ -25,7 +25,7 @@ from lacuna.system import Correction
 
 
 def test_trials_side_by_side_are_predicted_as_each_alone(system, theta):
-    """Walks of several lengths and slopes in one kernel's lanes, and one among them that cannot be simulated."""
+    """Walks of several lengths and slopes share a kernel's lanes, also with one that cannot be simulated."""
     walk = next(t for t in system.trials if t.experiment == "locomotion")
     short = replace(walk.payload, time_s=walk.time_s[: len(walk.time_s) // 2], inclination_deg=4.0)
     half = {c: v[: len(short.time_s)] for c, v in walk.channels.items()}
@@ -86,7 +86,7 @@ def test_what_travelled_to_another_process_predicts_the_same(system, theta):
 
 
 def test_a_prediction_never_looks_at_what_was_measured(dataset, system, theta):
-    """Outputs replaced by rubbish: the same predictions."""
+    """Predictions stay the same if the outputs are replaced by rubbish."""
     outputs = ("force_N", "pressure", "displacement_head", "displacement_tail")
     for trial, recorded in zip(system.trials, dataset.trials, strict=True):
         hidden = (*outputs, "displacement_mm") if trial.experiment == "step_response" else outputs
@@ -108,7 +108,7 @@ def test_what_is_said_not_to_matter_does_not(system, theta):
 
 
 def test_mu_s_can_be_found_by_derivatives(system, theta):
-    """The peak of a pull lies between samples; a prediction that jumped would have no slope there."""
+    """The peak of a pull lies between samples; a prediction that jumped there would have no slope."""
     pull = next(t for t in system.trials if t.experiment == "anchor_pull" and t.payload.pressure_psi > 0)
     slopes = []
     for mu_s in np.linspace(0.44, 0.52, 41):
@@ -133,7 +133,7 @@ def test_effects_act_where_they_are_said_to(system, theta, effect):
 def test_repeats_share_a_condition_and_friction_may_wobble(system):
     nuisances = {t.experiment: [p.name for p in system.nuisances(t)] for t in system.trials}
     assert nuisances["static_loading"] == []
-    assert nuisances["step_response"] == ["switch_late_s"], "the command column tells it to a sample, nothing else does"
+    assert nuisances["step_response"] == ["switch_late_s"], "only the command column shows it, to a sample"
     assert nuisances["locomotion"] == ["friction_scale"]
     assert nuisances["anchor_pull"] == ["friction_scale", "slip_late_s"]
 
@@ -147,7 +147,7 @@ def test_candidates_can_be_predicted(system, theta):
 
 
 def test_the_head_of_a_candidate_pull_is_extended_as_that_of_a_recorded_one(system, theta):
-    """With play in the spring it then holds otherwise: the experiment that tells backlash from hysteresis."""
+    """With play in the spring this changes its holding force: the experiment that tells backlash from hysteresis."""
     pulls = [c.trial for c in system.candidate_experiments() if c.experiment == "anchor_pull"]
     assert {pull.payload.extended_psi for pull in pulls} == set(EXTENDED.values())
     vented = next(pull for pull in pulls if pull.payload.pressure_psi == 0.0)
@@ -175,7 +175,7 @@ def test_the_identified_model_predicts_what_the_system_does(system, theta):
 
 
 def test_a_model_at_a_fit_has_only_what_was_fitted(dataset, system, theta):
-    """A curve that the model to start from had was written back as if it had been."""
+    """A learnt curve of the initial model was once written back as if it had been fitted."""
     curve = LearntCurve(-0.8, 0.8, np.full((1, 9), 30.0))
     bent = RobotSystem(dataset, replace(system.model, learnt={"body_damper": curve}), system.curves, system.fitted)
     assert not bent.model_at(theta).learnt
@@ -184,7 +184,7 @@ def test_a_model_at_a_fit_has_only_what_was_fitted(dataset, system, theta):
 def test_what_remembers_travel_sees_a_turn_between_samples(dataset, system, theta):
     recorded, effect = dataset.trials[0], engine_effects()["hysteresis"]
     loaded = theta | {effect.full_name(p): p.value for p in effect.parameters}
-    low_mm, half_s = recorded.columns["displacement_mm"].min(), 5.51  # it turns in the middle between two samples
+    low_mm, half_s = recorded.columns["displacement_mm"].min(), 5.51  # it turns midway between two samples
 
     def force(rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
         time_s = np.arange(0.0, 2.0 * half_s, 1.0 / rate_hz)
@@ -198,7 +198,7 @@ def test_what_remembers_travel_sees_a_turn_between_samples(dataset, system, thet
 
 
 def highest_psi(dataset, gauge_psi, **walk):
-    """Of the body in a walk of the day, as the model of a lab whose gauge says `gauge_psi` predicts it."""
+    """Highest predicted pressure of the body in a walk, for a lab whose gauge reads `gauge_psi`."""
     statics, (walked,) = dataset.of("static_loading"), dataset.of("locomotion")
     trials = (*statics, replace(walked, **{"extra": {"set_point_psi": 8.4741}} | walk))
     system = prepare(replace(dataset, known={"supply_positive_psi": gauge_psi}, trials=trials))
@@ -243,7 +243,7 @@ def test_knowledge_of_what_the_model_does_not_have_is_refused(dataset):
 
 
 def test_a_model_with_effects_or_learnt_curves_is_no_base_model(dataset):
-    """They were left out without a word."""
+    """A completed model is refused as a base model; its effects and curves were once left out silently."""
     curve = LearntCurve(-0.8, 0.8, np.zeros((1, 9)))
     completed = replace(nominal().with_effects({"choked_flow": {}}), learnt={"body_damper": curve})
     with pytest.raises(ModelParameterError, match=r"\[effects.choked_flow\], \[learnt.body_damper\].* base model"):

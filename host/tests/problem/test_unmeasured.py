@@ -1,4 +1,4 @@
-"""What nobody measured has a prior; what the data set declares is known; what is never fitted lies between others."""
+"""Unmeasured parameters have priors, declared ones are known, and spare conditions lie between fitted ones."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A campaign's results of a made-up robot, for pages: nothing is simulated."""
+"""Results of a campaign with a made-up robot, for tests of pages: nothing is simulated."""
 
 import json
 import re
@@ -118,13 +118,13 @@ _GAITS = (("baseline", 5.7, 8.0, 10.8), ("base", 2.9, 20.4, 23.3), ("completed",
 
 
 def text_of(html):
-    """What a reader sees of a page."""
+    """The text of a page that a reader sees."""
     shown = re.sub(r"<(script|style|title)\b.*?</\1>", " ", html, flags=re.DOTALL)
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", shown)).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def columns(period_s, cycles=14, speed_mm_s=10.0):
-    """Those of a walk."""
+    """Columns of a walk."""
     time_s = np.arange(0, cycles * period_s, 0.02)
     phase = 2 * np.pi * time_s / period_s
     record = {
@@ -139,7 +139,7 @@ def columns(period_s, cycles=14, speed_mm_s=10.0):
 
 
 def walks():
-    """One of each gait, the base model 2 % slow."""
+    """One walk of each gait; the base model is 2 % slow."""
     found = {}
     for name, period_s, speed, _ in _GAITS:
         true, slow = (columns(period_s, speed_mm_s=share * speed) for share in (1.0, 0.98))
@@ -170,7 +170,7 @@ def traces():
 
 
 def summary(sealed=True):
-    """As summary.json; of 256 robots that differ a little, 59 % do not walk with the baseline."""
+    """The content of summary.json; of 256 robots that differ a little, 59 % do not walk with the baseline."""
     return {
         "gaits": [
             {
@@ -210,7 +210,7 @@ def page(sealed=True):
 
 
 def finished(folder, area_N_psi=9.0, effects=None):
-    """A campaign as `bifa campaign` leaves it."""
+    """The folder of a finished campaign, as `bifa campaign` leaves it."""
     folder.mkdir(parents=True)
     told = summary()
     if effects is not None:

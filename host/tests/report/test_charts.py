@@ -1,6 +1,7 @@
-"""Charts of walks side by side and of a data set's trials: words, units, and one color for one chamber."""
+"""Charts of walks side by side and of a data set's trials: words, units, and one color per chamber."""
 
 import numpy as np
+import pytest
 
 from bifa.data import Trial
 from bifa.report.datasets import condition_chart
@@ -58,3 +59,10 @@ def test_repeats_of_a_test_stand_are_told_apart():
     assert [key.label for key in chart.keys] == ["run 1", "run 2"]
     assert chart.columns[0].panels[0].x.label == "displacement, mm"
     assert chart.columns[0].panels[0].y.label == "force, N"
+
+
+def test_pictures_leave_the_users_backend_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr("matplotlib.use", lambda *_: pytest.fail("a notebook would show nothing any more"))
+    monkeypatch.setattr("matplotlib.pyplot.subplots", lambda *_, **__: pytest.fail("opened a figure of the user's"))
+    draw_walks([Walk("a", 2.0, {SIMULATED: columns(2.0)})], tmp_path / "walks.png")
+    assert (tmp_path / "walks.png").read_bytes().startswith(b"\x89PNG")

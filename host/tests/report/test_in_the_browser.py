@@ -18,12 +18,12 @@ pytestmark = pytest.mark.real_time
 
 LOOKS = Path(__file__).with_name("looks.js").read_text(encoding="utf-8")
 WIDE, NARROW = 1280, 390
-_INK = "document.querySelector('.plot').charts[0].options.scales.x.ticks.color"  # of the plots' letters
+_INK = "document.querySelector('.plot').charts[0].options.scales.x.ticks.color"  # color of the plots' text
 
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory):
-    """Where each page is."""
+    """The folder with all pages."""
     folder = tmp_path_factory.mktemp("pages")
     runs = read_runs([sample.finished(tmp_path_factory.mktemp("runs") / day) for day in ("monday", "tuesday")])
     for name, page in {
@@ -37,7 +37,7 @@ def pages(tmp_path_factory):
 
 
 def engines_own():
-    """A page of the engine with all that it can show."""
+    """A page of the engine with every element that it can have."""
     error = sample.DIAGNOSIS["error"]
     figure = engine_page.both_palettes(lambda stream, dark: draw_errors(error, stream, dark), "errors")
     table = engine_page.PageTable(("effect", "size", "why"), [("delay", "10 ms", "it says so")], "Named", 0, True)
@@ -50,7 +50,7 @@ def engines_own():
 
 @pytest.fixture(scope="module")
 def tabs(browser, pages):
-    """A tab for each page, drawn, and what they have complained of."""
+    """A tab for each page, drawn, and the list of their complaints."""
     complaints, found = [], {}
     own = [path.as_uri() for path in pages.iterdir()]
     for path in sorted(pages.iterdir()):
@@ -69,7 +69,7 @@ def tabs(browser, pages):
 
 @pytest.fixture
 def opened(tabs):
-    """opened(name, width, scheme): the page's tab; whatever it complains of fails the test."""
+    """opened(name, width, scheme): the page's tab; any complaint fails the test."""
     found, complaints = tabs
 
     def look(name, width=WIDE, scheme="light", motion="no-preference"):
@@ -138,7 +138,7 @@ def test_a_plot_zooms_and_comes_back_and_its_column_follows(opened):
 
 
 def _column_of_panels(page) -> int:
-    """Which plot has several panels over one another."""
+    """Index of the first plot with several panels above one another."""
     return page.evaluate("[...document.querySelectorAll('.plot')].findIndex((box) => box.charts.length > 1)")
 
 
@@ -189,7 +189,7 @@ def test_the_clock_of_the_animation_tells_the_time_at_its_dot(opened):
     page = opened("campaign")
     figure = page.locator(".motion")
     shown = float(figure.get_attribute("data-shown"))
-    assert shown > 1.5 * float(figure.get_attribute("data-seconds")), "a walk that is shown faster than life"
+    assert shown > 1.5 * float(figure.get_attribute("data-seconds")), "the walk is shown faster than real time"
     figure.locator("input").fill(f"{0.5 * shown:.1f}")
     dot, line = (
         page.evaluate(
@@ -202,7 +202,7 @@ def test_the_clock_of_the_animation_tells_the_time_at_its_dot(opened):
     assert figure.locator("output").inner_text() == f"{0.5 * shown:.1f} s"
     slider = figure.locator("input")
     slider.fill(str(shown))
-    assert figure.locator("output").inner_text() == f"{shown:.1f} s", "its end, not its beginning again"
+    assert figure.locator("output").inner_text() == f"{shown:.1f} s", "its end, not its start again"
 
 
 def test_the_animation_stands_still_for_who_prefers_that(opened):
@@ -232,10 +232,10 @@ def test_on_paper_nothing_is_cut_off_and_no_table_is_split(opened, tmp_path):
         [" ".join(row.inner_text().split()) for row in table.locator("tbody tr").all()]
         for table in page.locator("table").all()
     ]
-    for height_mm in (297, 279, 250, 215):  # A4, Letter, and sheets that would cut where those do not
+    for height_mm in (297, 279, 250, 215):  # A4, Letter, and sheets that break at other places
         page.pdf(path=tmp_path / "page.pdf", width="210mm", height=f"{height_mm}mm")
         printed = page.evaluate("window.onPaper")
-        assert printed["widest"] <= 700, "wider than what A4 leaves"
+        assert printed["widest"] <= 700, "wider than the printable width of A4"
         assert printed["ink"] == LIGHT["ink"], "dark on white, whatever the screen's scheme"
         sheets = pages_of(tmp_path / "page.pdf")
         for rows in tables:
@@ -244,5 +244,5 @@ def test_on_paper_nothing_is_cut_off_and_no_table_is_split(opened, tmp_path):
 
 
 def pages_of(pdf):
-    """The text of each sheet, spaces evened out and ligatures spelt."""
+    """The text of each sheet, with spaces normalised and ligatures spelt out."""
     return [" ".join(normalize("NFKC", sheet.extract_text()).split()) for sheet in PdfReader(pdf).pages]

@@ -74,12 +74,12 @@ def test_the_first_screen_answers_and_says_what_its_words_mean(html):
 
 
 def test_each_round_has_its_gait_its_speeds_and_the_last_its_end(html):
-    section = text_of(html[html.index('id="gaits-that-no-fit-has-seen"') :].split("</section>")[0])
-    assert "Round 1: the model has hysteresis added to it, its gait is 2.80 s, head 204° and tail 332° ahead" in section
-    assert "Round 2: the model has hysteresis and valve latency added to it, its gait is 2.61 s" in section
+    section = text_of(html[html.index('id="gaits-that-were-not-fitted"') :].split("</section>")[0])
+    assert "Round 1: the model includes hysteresis; its gait is 2.80 s, head 204° and tail 332° ahead" in section
+    assert "Round 2: the model includes hysteresis and valve latency; its gait is 2.61 s" in section
     assert "1 21.40 (21.30 to 21.50; 0.97) 20.60 ± 0.01 (outside) 2.31 0.104 " in section
     assert "2, edge 20.87 (20.77 to 20.97; 0.97) 20.88 ± 0.02 0.117" in section
-    assert "It ended after round 2: the speed of its gait is predicted to within the scatter of repeats" in section
+    assert "The rounds ended after round 2: the speed of its gait is predicted to within the scatter" in section
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_each_round_has_its_gait_its_speeds_and_the_last_its_end(html):
 )
 def test_rounds_that_end_without_a_prediction_say_so(ended, why):
     section = rounds_section([*sample.ROUNDS[:1], sample.ROUNDS[1] | {"ended": ended}])
-    assert section.paragraphs[-1].startswith("It ended after round 2: ")
+    assert section.paragraphs[-1].startswith("The rounds ended after round 2: ")
     assert why in section.paragraphs[-1]
 
 
@@ -180,7 +180,7 @@ def test_the_animation_moves_as_the_record_does():
 
 
 def test_the_terminal_says_a_diagnosis_in_words_within_80_columns():
-    """Tables and sentences of the page, nothing else, and no identifier."""
+    """The terminal shows the tables and sentences of the page, nothing else, and no identifier."""
     text = StringIO()
     console = Console(file=text, width=80)
     diagnosis = sample.DIAGNOSIS

@@ -1,4 +1,4 @@
-"""What `--port` names: wrong ones are said, a serial port is opened exclusively."""
+"""`--port`: wrong ports are reported, and a serial port is opened exclusively."""
 
 import pytest
 
@@ -27,7 +27,7 @@ def test_a_serial_port_exclusive_and_unplugged():
         began_s = rig.clock.now()
         samples = uno.samples(1.5)
         assert rig.clock.now() - began_s >= 1.5
-        assert len(samples) > 20, "all that came in that time, and not only the first"
+        assert len(samples) > 20, "all samples of that time, not only the first"
         plugged.unplug()
         with pytest.raises(PortGoneError, match="gone"):
             uno.set("period_s", 4.0)

@@ -1,4 +1,4 @@
-"""A port that does not open: one sentence with the cause that is known."""
+"""A port that does not open is reported in one sentence with its cause."""
 
 import contextlib
 import errno
@@ -19,7 +19,7 @@ from bifa.rig import open_rig
 from bifa.rig.serial_transport import SerialTransport
 from bifa.rig.unopened import holder_of, why_unopened
 
-pytestmark = pytest.mark.skipif(not Path("/proc/locks").exists(), reason="the system tells nobody who holds a port")
+pytestmark = pytest.mark.skipif(not Path("/proc/locks").exists(), reason="the system does not tell who holds a port")
 HOLD = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive={lock}); print(flush=True); sys.stdin.read()"
 
 
@@ -34,7 +34,7 @@ def port():
 
 @pytest.fixture
 def held(port):
-    """Another program has the port: `hold(lock)` gives its process."""
+    """A function `hold(lock)` that lets another program open the port, and returns its process."""
     programs = []
 
     def hold(lock: bool) -> subprocess.Popen:
@@ -70,7 +70,7 @@ def test_who_has_a_port_open_without_a_lock_is_found_as_well(port, held):
 
 
 def test_who_keeps_the_lock_of_a_program_that_has_ended_is_named(port):
-    """A worker, for instance, where the program itself was killed."""
+    """The named process may be a worker that outlived the killed program."""
     forks = HOLD.format(lock=True).replace("sys.stdin", "import os; os.fork() and os._exit(0); sys.stdin")
     with subprocess.Popen([sys.executable, "-c", forks, port], stdin=subprocess.PIPE) as program:
         program.wait()
@@ -114,7 +114,7 @@ def test_a_port_that_goes_as_it_is_opened_is_gone(port, monkeypatch):
 
 
 def test_a_port_that_goes_as_its_baud_rate_is_set_is_gone(port, monkeypatch):
-    """pyserial sets it anew with every time-out."""
+    """A port can vanish on any read, since pyserial sets the baud rate with every time-out."""
 
     def gone(*_: object) -> None:
         raise OSError(errno.EIO, "Input/output error")
@@ -129,5 +129,5 @@ def test_a_recording_that_never_began_ends_with_the_cause_and_does_not_wait(tmp_
     record = [sys.executable, "-m", "bifa", "record", "--port", "/dev/not-there", "--out", str(tmp_path / "telemetry")]
     done = subprocess.run(record, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
-    assert done.stderr == "error: there is no port /dev/not-there: `bifa doctor` lists those there are\n"
+    assert done.stderr == "error: there is no port /dev/not-there: `bifa doctor` lists the available ones\n"
     assert "when that Uno is back" not in done.stdout

@@ -1,4 +1,4 @@
-"""The host's CPG: eq. (9) settles where the thresholds assume it."""
+"""The host's CPG: eq. (9) settles at the phases that the thresholds assume."""
 
 import math
 

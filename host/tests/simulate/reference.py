@@ -1,7 +1,7 @@
 """An independent solution of eq. (1)-(8): event-driven, for comparison with the simulator. Slow and exact.
 
 Nothing of `bifa.simulate` is used. Between events the equations are smooth and are integrated by Dormand and Prince's
-5(4) pair; each change (an end starts or stops sliding, an actuator meets or leaves the wall, passes x_th) is found by
+5(4) pair; each event (an end starts or stops sliding, an actuator meets or leaves the wall, passes x_th) is found by
 bisection of the step in which it lies, and switches the right-hand side.
 """
 
@@ -12,9 +12,7 @@ from numba import njit
 from scipy.integrate import RK45
 
 GRAVITY = 9.80665
-_A = np.vstack(
-    [np.pad(RK45.A, ((0, 0), (0, 1))), RK45.B]
-)  # Dormand and Prince (1980), the last stage that of the result
+_A = np.vstack([np.pad(RK45.A, ((0, 0), (0, 1))), RK45.B])  # Dormand and Prince (1980); the last stage is the result
 _E = RK45.E
 _SCALE = np.array([1.0, 100.0, 1.0, 100.0, 1e3, 1.0, 100.0, 1e3, 1.0, 100.0, 1e3])  # m, m/s, N over metres
 # Modes: sliding of head and tail, wall contact of head and tail, bulge (alpha_s) of body, head, tail
@@ -22,7 +20,7 @@ SLIDE_H, SLIDE_T, WALL_H, WALL_T, BULGE_B, BULGE_H, BULGE_T = range(7)
 
 
 def constants(model):
-    """Flat constants of a model: numbers, and the two polynomials with their ends."""
+    """Constants of a model as flat arrays: numbers, and the two polynomials with their ends."""
     v = model.values
     body, small = model.body_stiffness, model.small_stiffness
     numbers = np.array(
@@ -120,7 +118,7 @@ def switch(c, body, s, mode, which):
 
 @njit
 def trial_step(c, body, small, s, mode, command, h, k, new):
-    """One Dormand-Prince step into `new`; returns its error estimate over the scales."""
+    """One Dormand-Prince step into `new`; returns its error estimate relative to the scales."""
     stage = np.empty(s.size)
     for j in range(7):
         stage[:] = s
@@ -176,7 +174,7 @@ def advance(c, body, small, s, mode, command, now, until, tolerance):
 
 
 def settled_switches(gait, duration_s):
-    """[(time, chamber, command)] by the definition of section V.A, phases psi apart, the body's 0 at time 0."""
+    """Switches [(time, chamber, command)] as defined in section V.A: phases psi apart, the body's 0 at time 0."""
     first, later = [], []
     ahead = (0.0, gait.psi12_deg, gait.psi13_deg)
     for i, duty in enumerate((gait.duty_body, gait.duty_head, gait.duty_tail)):

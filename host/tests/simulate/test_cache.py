@@ -1,4 +1,4 @@
-"""Compiled code is kept, and never older than its sources."""
+"""Compiled code is cached, and never older than its sources."""
 
 import subprocess
 import sys
@@ -45,7 +45,7 @@ def test_the_entries_name_depends_on_every_compiled_source():
 
 @pytest.fixture
 def no_cache(tmp_path, monkeypatch) -> Path:
-    """Where temporary files go, on a computer whose cache cannot be written."""
+    """The folder of temporary files, on a computer whose cache cannot be written."""
     (tmp_path / "file").write_text("")
     (tmp_path / "tmp").mkdir()
     monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path / "file" / "cache"))

@@ -1,4 +1,4 @@
-"""The library: every effect declares what it does, does it only there, and vanishes with its size."""
+"""The library: every effect acts where it declares and only there, and vanishes with its size."""
 
 import inspect
 import re
@@ -26,7 +26,7 @@ NAMED = {
 }  # fmt: skip
 EXPERIMENTS = ("static_loading", "step_response", "anchor_pull", "locomotion")
 LEAST_VISIBLE = {"force_N": 0.02, "displacement_mm": 0.02, "displacement_head_mm": 0.02}  # pressures: 0.005 psi
-# Friction at the one speed of a pull tells little of how it falls with speed; everything else is plain.
+# A pull at one speed shows little of how friction falls with speed; all other effects show clearly.
 FAINT = {("stribeck", "anchor_pull")}
 
 
@@ -94,8 +94,8 @@ def test_a_line_with_a_delay_is_one_whose_valves_are_late():
     outside=st.floats(0.1, 3.0),
 )
 def test_the_throat_and_the_resistance_after_it_pass_the_same_flow(sonic_psi_s, critical, rate_per_s, inside, outside):
-    """ISO 6358-1's flow between the pressures upstream and downstream of a throat, in atmospheres, without the closed
-    form: at the pressure between both, found by bisection, the flows agree."""
+    """ISO 6358-1's flow through a throat, in atmospheres, without the closed form: the pressure between throat and
+    resistance at which the flows agree is found by root finding."""
     assume(abs(inside - outside) > 1e-3)
 
     def sonic(between: float) -> float:
@@ -123,7 +123,7 @@ def test_size_zero_is_exactly_the_base_model(name, base):
 
 @pytest.mark.parametrize("name", sorted(effects.library()))
 def test_a_small_effect_is_a_small_change(name, base):
-    """No jump where an effect sets in, so that a fit can start from nothing."""
+    """No effect sets in with a jump, so that a fit can start at size 0."""
     tiny = {size.name: 1e-4 * size.typical for size in effects.library()[name].sizes}
     changed = simulate.step_response(robot.nominal().with_effects({name: tiny}), "large")
     for channel in ("displacement_mm", "pressure_psi"):
@@ -166,7 +166,7 @@ def test_a_wrong_effect_is_refused_by_name_and_range(chosen, told):
 
 @pytest.fixture
 def with_new_effect(monkeypatch):
-    """The library as it is with one more file in it; the flat layout follows."""
+    """The library with one more file in it; the flat layout follows."""
 
     module = types.ModuleType("bifa.effects.swelling")
     parameter = EffectParameter("share", "", 0.0, 1.0, 0.1, "size", size=True)
@@ -190,24 +190,22 @@ def test_adding_an_effect_is_adding_a_file(with_new_effect):
 
     source = with_new_effect(area=area)
     assert f"area_of_swelling(q[{layout.index('swelling.share')}], stroke_share)" in source
-    assert source != hooks.chains.__loader__.get_source(hooks.chains.__name__)  # so the compiled code is another, too
+    assert source != hooks.chains.__loader__.get_source(hooks.chains.__name__)  # so the compiled code differs too
 
 
 def test_an_effect_that_asks_for_what_there_is_not_is_refused(with_new_effect):
-    with pytest.raises(EffectError, match=r"swelling\.area asks for 'moon_phase'"):
+    with pytest.raises(EffectError, match=r"swelling\.area has an unknown argument 'moon_phase'"):
         with_new_effect(area=lambda share, moon_phase: share)
 
 
 @pytest.mark.parametrize("hook", ["initial", "spring_state", "play_state", "sensor", "line"])
 def test_an_effect_that_remembers_without_a_state_is_refused(with_new_effect, hook):
-    with pytest.raises(
-        EffectError, match=rf"swelling\.{hook} returns what is remembered: swelling must declare states=1"
-    ):
+    with pytest.raises(EffectError, match=rf"swelling\.{hook} returns a state: swelling must declare states=1"):
         with_new_effect(**{hook: lambda share: share})
 
 
 def test_an_effect_without_a_hook_is_refused(with_new_effect):
-    with pytest.raises(EffectError, match="swelling acts nowhere"):
+    with pytest.raises(EffectError, match="swelling does not act"):
         with_new_effect()
 
 
@@ -253,7 +251,7 @@ def test_of_shifted_instruments_displacements_are_those_of_other_times_and_nothi
     record = simulate.walk(shifted(late_s, share), FAST, time_s=time_s)
     base, truth = (simulate.walk(robot.nominal(), FAST, time_s=t) for t in (time_s, at_s))
     for name in ("displacement_head_mm", "displacement_tail_mm"):
-        # Where a wall is met or a foot slips the speed jumps within a sample, which a cubic rounds off.
+        # Where a wall is met or a foot slips, the speed jumps within a sample, which a cubic smooths.
         off = np.abs(record[name] - truth[name][when])[then_s < time_s[-1]]
         assert off.max() < 0.5
         assert np.sqrt(np.mean(off**2)) < 0.05

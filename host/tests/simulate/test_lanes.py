@@ -1,4 +1,4 @@
-"""The kernel in lanes against numba, which runs the same functions one at a time, and against tighter tolerances."""
+"""The kernel in lanes, compared with numba, which runs the functions one robot at a time, and with tight tolerances."""
 
 import ctypes
 import math
@@ -18,7 +18,7 @@ from bifa.simulate.lanes.translate import Intrinsic, Shapes, Translator, Untrans
 from bifa.simulate.paper import FAST
 from bifa.simulate.timeline import NO_COMMANDS
 
-ROBOTS = 11  # more than there are lanes, so that some take up a second one
+ROBOTS = 11  # more than there are lanes, so that some lanes take up a second robot
 TIME_S = np.arange(0.0, 6.0, 0.02)
 TOLERANCE_M = 1e-6
 ROUNDED = ("backlash", "hysteresis")
@@ -84,8 +84,8 @@ def test_lanes_and_numba_tell_the_same(effect, found):
         for one in found:
             got = one.march(plants, what, False)
             errors = [np.abs((a - b) / _size(b)).max() for a, b in zip(got, expected, strict=True)]
-            # Both take the same steps, but where a rounding decides whether a step is good enough: at rest both springs
-            # of ROUNDED divide one small difference by another.
+            # Both take the same steps unless rounding decides whether a step is accepted: at rest, both springs of
+            # ROUNDED divide one small difference by another.
             assert effect in ROUNDED or np.median(errors) < 1e-9, (name, errors)
             assert max(errors) < 5e-3, (name, errors)
 
@@ -202,7 +202,7 @@ def test_derivatives_together_are_those_of_a_tight_tolerance(gait):
 
 
 def test_the_first_robot_leads_every_pack():
-    """Equal robots in different packs differ by nothing from the first."""
+    """Equal robots in different packs give exactly the result of the first."""
     plants = _robots(None, 1) * 20
     commands = [simulate.of_gait(FAST, 5.0)] * 20
     level = {"times_s": [np.arange(0.0, 4.0, 0.01)] * 20, "inclinations_deg": [0.0] * 20}
@@ -222,7 +222,7 @@ print(simulate.speed(robot.nominal(), robot.BASELINE, 3).advance_m[-1], simulate
 def test_without_a_compiler_numba_does_it_and_one_line_says_so(tmp_path):
     cache = tmp_path / "cache"
     cache.mkdir()
-    for old in build.generated.folder().glob("*.py"):  # what numba has compiled serves; the kernels do not
+    for old in build.generated.folder().glob("*.py"):  # numba's compiled code is reused, the kernels are not
         (cache / old.name).symlink_to(old)
     (cache / "__pycache__").symlink_to(build.generated.folder() / "__pycache__")
     nowhere = {"PATH": str(tmp_path), "BIFA_CACHE_DIR": str(cache)}
@@ -332,7 +332,8 @@ def _one_pair_or_another(x):
 
 
 def test_what_has_no_form_in_lanes_is_refused_by_name_or_replaced():
-    with pytest.raises(UntranslatableError, match=r"_asks_for_the_moon: line 2 calls math.gamma"):
+    line = _asks_for_the_moon.__code__.co_firstlineno + 1
+    with pytest.raises(UntranslatableError, match=rf"test_lanes.py:{line}: _asks_for_the_moon calls math.gamma"):
         Translator(Shapes({}, {}, {}), {}).function(_uses_it, ("F",))
     with pytest.raises(UntranslatableError, match=r"one_pair_or_another.*: a conditional of several values"):
         Translator(Shapes({}, {}, {}), {}).function(_one_pair_or_another, ("F",))

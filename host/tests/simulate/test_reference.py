@@ -1,4 +1,4 @@
-"""Against an independent, event-driven solution of eq. (1)-(8)."""
+"""The simulator, compared with an independent, event-driven solution of eq. (1)-(8)."""
 
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
@@ -16,8 +16,8 @@ from . import reference
 CYCLES = 10
 FINE_M, FINEST_M = 1e-7, 1e-8
 WALKS_MM_S = 2.0
-# A gait of which a change of 1e-6 in any number of the reference's own model moves the result more than this is a
-# cliff: its advance is no number to compare with.
+# A gait is on a cliff if a relative change of 1e-6 in the reference's static friction moves its result by more than
+# this: its advance is then no number to compare with.
 CLIFF = 1e-3
 
 
@@ -95,7 +95,7 @@ def test_every_channel_of_a_record(gait):
 
 
 def test_friction_work_is_never_given_back():
-    """Work of the pressure, less what is stored and damped, is what friction took: it only grows."""
+    """The work of the pressure, less the stored and damped energy, is what friction took: it only grows."""
     model, gait = robot.nominal(), FAST
     time = np.arange(0.0, 2.0 * gait.period_s, 2e-5)
     s = simulate.walk(model, gait, time_s=time, tolerance_m=1e-8)
@@ -106,6 +106,6 @@ def test_friction_work_is_never_given_back():
     kinetic = 0.5 * model["head_mass_kg"] * s["velocity_head_m_s"] ** 2
     kinetic += 0.5 * model["tail_mass_kg"] * s["velocity_tail_m_s"] ** 2
     work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(time))]) - kinetic
-    taken = work[::500]  # a step each 10 ms: the trapezoid's error at the jerks is then small against the work
+    taken = work[::500]  # every 10 ms, so that the trapezoidal error at the jerks is small against the work
     assert taken[-1] > 0.1
     assert np.diff(taken).min() > -2e-4

@@ -108,7 +108,7 @@ def test_bad_places_and_models_are_refused_with_what_is_wrong(tmp_path, monkeypa
 def test_what_lies_outside_a_range_or_does_not_exist_is_refused_with_what_may_be(arguments, words):
     result = _run(*arguments.split())
     assert result.exit_code == 2
-    assert words in " ".join(result.output.replace("│", " ").split())  # a frame, wrapped anywhere
+    assert words in " ".join(result.output.replace("│", " ").split())  # in a frame, wrapped anywhere
 
 
 def test_the_papers_table_takes_a_gait_without_a_model(tmp_path, monkeypatch):
@@ -120,9 +120,11 @@ def test_the_papers_table_takes_a_gait_without_a_model(tmp_path, monkeypatch):
     assert compared.call_args_list == [call(robot.nominal(), FAST)] * 2
 
 
-@pytest.mark.parametrize(("cycles", "words"), [(2, "too few to tell"), (4, "too few to tell"), (6, "not settled")])
+@pytest.mark.parametrize(
+    ("cycles", "words"), [(2, "too few cycles to tell"), (4, "too few cycles to tell"), (6, "not settled")]
+)
 def test_of_few_cycles_nothing_is_said_to_be_unsettled(monkeypatch, cycles, words):
-    """As a gait that never settles gives them."""
+    """A gait that never settles is called so only after enough cycles."""
     monkeypatch.setattr("bifa.gait.settling.WITHIN", -1.0)
     assert words in _words(_run("--cycles", cycles))
 
@@ -134,4 +136,4 @@ def test_of_few_cycles_nothing_is_said_to_be_unsettled(monkeypatch, cycles, word
 def test_what_the_papers_table_would_ignore_is_refused(ignored):
     result = _run("--paper", *f"--{ignored}".split())
     assert result.exit_code == 2
-    assert "--paper simulates walks of its own" in result.output
+    assert "--paper simulates its own walks" in result.output

@@ -1,4 +1,4 @@
-"""Single actuators: against SciPy's LSODA, closed forms, and the paper's forces."""
+"""Single actuators, compared with SciPy's LSODA, closed forms, and the paper's forces."""
 
 from itertools import pairwise
 
@@ -13,8 +13,8 @@ ON_S, OFF_S, STEP_PSI = 0.5, 4.0, 7.0
 
 
 def _lsoda_step(model, actuator, time, slope, force_kept):
-    """Eq. (1)-(3) as they stand, or, unless the air keeps its force, with a pressure in the place of (2)'s force;
-    smooth but for x_th. `slope`: of the area over the stroke."""
+    """Eq. (1)-(3) as in the paper if `force_kept`, otherwise with a pressure in place of the force in eq. (2); smooth
+    except at x_th. `slope`: relative change of the area over the stroke."""
     name, moved = {"large": ("body", "head"), "small": ("small", "small")}[actuator]
     curve, mass = getattr(model, f"{name}_stiffness"), model[f"{moved}_mass_kg"]
     b, nominal = model[f"{name}_damping_Ns_m"], model[f"{name}_area_N_psi"]
@@ -104,7 +104,7 @@ def test_anchor_holds_what_the_paper_says_and_slides_with_less():
         (lambda m: simulate.static_loading(m, "large", [0.0, 1.0], [0.0, 1.0], 99.0), r"-14\.7 to 14\.7"),
         (lambda m: simulate.anchor_pull(m, [0.0, 1.0], 0.0, 8.5), "rate"),
         (lambda m: simulate.walk(m), "gait"),
-        (lambda m: simulate.walk(m, robot.BASELINE, time_s=[1.0, 0.5]), "rise"),
+        (lambda m: simulate.walk(m, robot.BASELINE, time_s=[1.0, 0.5]), "decrease"),
         (lambda m: simulate.walk(m, robot.BASELINE, inclination_deg=100.0), "-90 to 90"),
         (lambda m: simulate.walk(m, robot.BASELINE, tolerance_m=0.0), "tolerance"),
         (lambda m: simulate.terrain([simulate.Obstacle(0.1, 0.05, 0.08)]), "97 to 147"),

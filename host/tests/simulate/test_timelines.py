@@ -1,4 +1,4 @@
-"""Commands: from gaits, from phases, from records."""
+"""Timelines of commands: from gaits, from phases, from records."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_settled_phases_of_the_oscillators_switch_alike():
 
 @pytest.mark.parametrize("clock", [1.0, 1.004])
 def test_switches_are_found_well_within_a_sample(clock):
-    gait = Gait(2.7131, 250.0, 80.0, 0.62, 0.45, 0.5)  # no multiple of a sample: then switches show where they are
+    gait = Gait(2.7131, 250.0, 80.0, 0.62, 0.45, 0.5)  # no multiple of a sample, so that samples resolve the switches
     true = simulate.of_gait(gait, 40.0)
     sample = np.arange(0.0, 38.0, 0.01)
     seen = true.at(sample / clock).astype(float).T

@@ -1,4 +1,4 @@
-"""Walks: limits that can be told without a simulation, batches, scenarios."""
+"""Walks: limiting cases with known outcomes, batches, scenarios."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_vertical_pipe_is_climbed_and_the_fastest_gait_is_not_for_it():
 @pytest.mark.parametrize("tolerance_m", [3e-5, 1e-5, 1e-7])
 @pytest.mark.parametrize(("heavier", "advance_mm"), [(-0.001, 48.0), (0.001, 60.6)], ids=["tail", "head"])
 def test_of_two_ends_off_the_wall_the_lighter_gives_however_long_the_steps_are(tolerance_m, heavier, advance_mm):
-    # The head stops and both would start backward at nearly the same time: who stopped first must not matter.
+    # The head stops and both would start backward at nearly the same time: which stopped first must not matter.
     gait = Gait(3.131, 156.65, 76.72, 0.6356, 0.6931, 0.6931)
     uneven = robot.nominal().with_values({"head_mass_kg": 0.175 + heavier})
     assert 1e3 * simulate.speed(uneven, gait, 6, tolerance_m).advance_m[-1] == pytest.approx(advance_mm, abs=0.1)

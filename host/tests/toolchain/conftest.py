@@ -1,4 +1,4 @@
-"""A machine that has the tools which the stand-ins are made of."""
+"""Fixtures: a machine with the tools from which the stand-ins are made."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ def project() -> Path:
 
 @pytest.fixture
 def program() -> Callable[[Path, str], Path]:
-    """program(path, script): a shell script in a program's place."""
+    """A function `write(path, script)` that puts a shell script in a program's place."""
 
     def write(path: Path, script: str) -> Path:
         path.write_text(f"#!/bin/sh\n{script}\n", "utf-8")
@@ -27,7 +27,7 @@ def program() -> Callable[[Path, str], Path]:
 
 @pytest.fixture
 def programs(program, tmp_path, monkeypatch) -> Path:
-    """A folder with an empty program for every tool of the AVR tool chain, alone on PATH."""
+    """A folder, alone on PATH, with an empty program for every tool of the AVR tool chain."""
     from provision.system import AVR_TOOLS
 
     folder = tmp_path / "programs"
@@ -40,7 +40,7 @@ def programs(program, tmp_path, monkeypatch) -> Path:
 
 @pytest.fixture
 def arduino_core(tmp_path, monkeypatch) -> Path:
-    """A folder laid out as Debian's arduino-core-avr."""
+    """A folder laid out like Debian's arduino-core-avr."""
     from provision import system
 
     root = tmp_path / "arduino"
@@ -52,7 +52,7 @@ def arduino_core(tmp_path, monkeypatch) -> Path:
 
 @pytest.fixture
 def core_dir(tmp_path) -> Path:
-    """An empty PlatformIO core directory, but for Unity's sources, which need a download otherwise."""
+    """A PlatformIO core directory that is empty except for Unity's sources, which would otherwise be downloaded."""
     folder = tmp_path / "project" / ".platformio"
     sources = folder / "sources" / "unity" / "src"
     sources.mkdir(parents=True)

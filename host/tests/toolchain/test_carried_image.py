@@ -1,4 +1,4 @@
-"""`bifa flash` without a checkout: the image that the package carries, checked, and written by avrdude alone."""
+"""`bifa flash` without a checkout: the image carried by the package is verified and written by avrdude alone."""
 
 import os
 import shutil
@@ -19,7 +19,7 @@ BUILT = Path(__file__).parents[3] / ".pio" / "build" / "uno" / "firmware.hex"
 
 @pytest.fixture
 def package(tmp_path) -> Path:
-    """A folder as that of bifa.firmware in a wheel."""
+    """A folder like that of bifa.firmware in a wheel."""
     folder = tmp_path / "site-packages" / "bifa" / "firmware"
     folder.mkdir(parents=True)
     write_image(BUILT, folder)
@@ -28,7 +28,7 @@ def package(tmp_path) -> Path:
 
 @pytest.fixture
 def writes(program, tmp_path, monkeypatch) -> Path:
-    """A program in avrdude's place, alone on PATH: it keeps its arguments and the file that it is given to write."""
+    """A stand-in for avrdude, alone on PATH, that keeps its arguments and the file it is given to write."""
     folder = tmp_path / "programs"
     folder.mkdir()
     program(folder / "avrdude", f'echo "$@" > {folder}/arguments\n/bin/cp uno.hex {folder}/written.hex')
@@ -38,7 +38,7 @@ def writes(program, tmp_path, monkeypatch) -> Path:
 
 @pytest.fixture
 def no_checkout(monkeypatch, package):
-    """The command as an installed package runs it."""
+    """Run the command as an installed package would."""
     monkeypatch.setattr("bifa.toolchain.find_project", lambda: None)
     monkeypatch.setattr("bifa.toolchain.choose_port", lambda port: port)
     monkeypatch.setattr(firmware, "carried_image", lambda: carried_image(package))
@@ -67,9 +67,9 @@ def test_without_avrdude_the_sentence_says_how_to_get_it(monkeypatch, tmp_path):
         flash.avrdude_program()
 
 
-@pytest.mark.skipif(not shutil.which("avrdude"), reason="no avrdude to ask")
+@pytest.mark.skipif(not shutil.which("avrdude"), reason="avrdude is not installed")
 def test_avrdude_itself_understands_the_command(package, tmp_path):
-    """It gets as far as opening the port, which is not there."""
+    """avrdude accepts the command and fails only at opening the port, which does not exist."""
     with pytest.raises(ToolchainError, match=r"not-there|can't open"):
         flash.write_with_avrdude(carried_image(package), os.fspath(tmp_path / "not-there"), lambda line: None)
 
@@ -100,7 +100,7 @@ def changed(at):
     ids=["no head", "its start", "all but its end", "another image", "at its start", "in the middle", "at its end"],
 )
 def test_a_damaged_image_or_one_of_which_nobody_knows_what_it_should_be_is_not_written(package, file, damage, says):
-    """Half unpacked, for instance where the disk was full."""
+    """An image that does not match its description is refused, as after a partial unpacking on a full disk."""
     (package / file).write_bytes(damage((package / file).read_bytes()))
     with pytest.raises(ImageError, match=says):
         carried_image(package)
@@ -121,5 +121,5 @@ def test_what_is_no_image_of_bifa_is_refused(tmp_path):
 
 
 def test_a_package_without_an_image_says_so(tmp_path):
-    with pytest.raises(ImageError, match="carries no firmware"):
+    with pytest.raises(ImageError, match="contains no firmware"):
         carried_image(tmp_path)

@@ -1,4 +1,4 @@
-"""`.ci/run`: checks, tests as elsewhere and tests are all run, whatever the first says; each can fail it."""
+"""`.ci/run` runs lint, the portability tests and the tests regardless of earlier failures; each can fail it."""
 
 import shutil
 import subprocess
@@ -23,12 +23,12 @@ def test_each_is_run_and_each_can_fail_it(project, program, tmp_path, failing):
 
 @pytest.mark.parametrize("ran", [True, False])
 def test_the_estimation_is_tested_once(project, program, tmp_path, ran):
-    """Not again on this machine where it has been tested as on another; here where it could not be."""
+    """The estimation tests are left out if the portability run has covered them, and run otherwise."""
     shutil.copytree(project / ".ci", tmp_path / ".ci")
     touch = "mkdir -p build/portability; touch build/portability/ran" if ran else "true"
     program(tmp_path / "make", f'case $1 in portability) {touch};; test) echo "$2";; esac')
     (tmp_path / "build" / "portability").mkdir(parents=True)
-    (tmp_path / "build" / "portability" / "ran").touch()  # of an earlier run, which says nothing
+    (tmp_path / "build" / "portability" / "ran").touch()  # left by an earlier run, so it does not count
     environment = {"PATH": f"{tmp_path}:/usr/bin:/bin"}
     done = subprocess.run([tmp_path / ".ci" / "run"], env=environment, capture_output=True, text=True, check=True)
     left_out = [f"--ignore=tests/{folder}" for folder in portability.ESTIMATION] if ran else []

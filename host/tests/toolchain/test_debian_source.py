@@ -1,4 +1,4 @@
-"""Source packages are fetched with a configuration of our own, made from the machine's archives."""
+"""Source packages are fetched with our own apt configuration, derived from the machine's archives."""
 
 import io
 import tarfile

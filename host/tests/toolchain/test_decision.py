@@ -1,4 +1,4 @@
-"""The choice between registry and stand-ins: made once, kept while it fits, said in one line."""
+"""The choice between registry and stand-ins is made once, kept while it is valid, and reported in one line."""
 
 import sys
 
@@ -10,7 +10,7 @@ from provision.decision import Decision
 
 @pytest.fixture
 def world(core_dir, monkeypatch):
-    """A project in a temporary folder; what would be installed is only noted."""
+    """A project in a temporary folder; installations are only noted."""
     done = []
     monkeypatch.delenv("PLATFORMIO_CORE_DIR", raising=False)
     monkeypatch.setattr(sys, "argv", ["provision"])

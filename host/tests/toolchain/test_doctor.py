@@ -1,4 +1,4 @@
-"""`bifa doctor`: each finding says what is there, or how to get it; the status says whether work can begin."""
+"""`bifa doctor`: each check reports what is installed or how to get it; the exit status tells if work can begin."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from bifa.toolchain.checks import MISSING, OK, OPTIONAL, Check
 
 @pytest.fixture
 def clone(tmp_path, monkeypatch):
-    """An empty clone in place of this one."""
+    """An empty clone that replaces this one."""
     for folder in ("firmware", "lib/cpg", ".pio/build/uno", ".platformio"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "lib/cpg/cpg.h").write_text("")
@@ -78,5 +78,5 @@ def test_without_a_checkout_it_looks_for_avrdude_and_the_image_carried(monkeypat
     found = {check.what: check for check in checks.run_checks(None)}
     assert "PlatformIO" not in found
     assert found["firmware image"].state == MISSING
-    assert "carries no firmware" in found["firmware image"].remedy
+    assert "contains no firmware" in found["firmware image"].remedy
     assert found["avrdude"].state in (OK, MISSING)

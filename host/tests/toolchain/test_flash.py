@@ -1,4 +1,4 @@
-"""`bifa flash`: the port is found and checked first, PlatformIO does the work, and failures become sentences."""
+"""`bifa flash` finds and checks the port first, leaves the work to PlatformIO, and reports failures in a sentence."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ from bifa.toolchain import ToolchainError, flash, project
 
 @pytest.fixture
 def platformio(program, tmp_path, monkeypatch):
-    """A program in PlatformIO's place: it notes its arguments, says something, and ends with a status."""
+    """A stand-in for PlatformIO that notes its arguments, prints a text, and exits with a status."""
 
     def pretend(says: str = "", status: int = 0):
         script = f'echo "$@" >> {tmp_path}/calls\ncat <<END\n{says}\nEND\nexit {status}'

@@ -1,4 +1,4 @@
-"""`make bench`: every benchmark runs, its figures are merged into bench.json, and a failing one is told."""
+"""`make bench` runs every benchmark, merges the figures into bench.json, and reports failures."""
 
 import json
 import sys
@@ -10,7 +10,7 @@ from benchmarks import __main__ as runner
 
 @pytest.fixture
 def bench_json(tmp_path, monkeypatch):
-    """Three benchmarks in place of the project's, one of them broken, and a bench.json of their own."""
+    """Three benchmarks that replace the project's, one of them broken, with their own bench.json."""
     folder = tmp_path / "benchmarks"
     folder.mkdir()
     (folder / "bench_first.py").write_text('def run():\n    print("first: 1")\n    return {"first": 1.0}\n')

@@ -1,4 +1,4 @@
-"""The tool that makes mutants of the safety code: what it changes, what it leaves alone, and what it says of them."""
+"""The mutation tool for the safety code: what it changes, what it leaves alone, and what it reports."""
 
 import pytest
 from mutation import __main__ as command

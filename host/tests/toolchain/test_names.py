@@ -1,4 +1,4 @@
-"""`make lint` holds the words of docs/glossary.md."""
+"""`make lint` enforces the vocabulary of docs/glossary.md."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def test_a_class_has_its_name_to_itself():
     one, other = Path("one.py"), Path("other.py")
     assert names.twice({one: "class Rig: pass", other: "class _Rig: pass\nrig = Rig()"}) == []
     (said,) = names.twice({one: "class Rig: pass", other: "\n\nclass Rig: pass"})
-    assert said == "other.py:3: the class Rig is another in one.py"
+    assert said == "other.py:3: the class Rig is also defined in one.py"
 
 
 def test_every_private_word_is_in_the_glossary_under_the_fields():

@@ -1,4 +1,4 @@
-"""With the stand-ins, PlatformIO's plain commands need no network, also after a full clean."""
+"""With the stand-ins, PlatformIO's ordinary commands need no network, even after a full clean."""
 
 import json
 import os
@@ -45,7 +45,7 @@ def small_project(tmp_path, project):
 
 
 def pio(project: Path, *words: str) -> subprocess.CompletedProcess:
-    """Run PlatformIO with every proxy a closed door, so that any use of the network fails at once."""
+    """Run PlatformIO with proxies that refuse connections, so that any use of the network fails at once."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PLATFORMIO_")}
     environment |= dict.fromkeys(("HTTP_PROXY", "HTTPS_PROXY", "http_proxy", "https_proxy"), "http://127.0.0.1:9")
     return subprocess.run([PIO, *words], cwd=project, env=environment, capture_output=True, text=True, check=False)
@@ -53,7 +53,7 @@ def pio(project: Path, *words: str) -> subprocess.CompletedProcess:
 
 @pytest.fixture
 def upload(small_project, program, tmp_path):
-    """Runs the upload with a program in avrdude's place; returns what that was called with, after {port}."""
+    """A function that uploads with a stand-in for avrdude and returns its arguments, with {port} for the port."""
     avrdude = own_stand_ins(small_project) / "packages" / "tool-avrdude" / "bin" / "avrdude"
     avrdude.unlink()
     program(avrdude, f'echo "$@" > {tmp_path}/call')
@@ -98,7 +98,7 @@ def test_a_suite_passes_and_can_fail(small_project, environment):
 
 
 def own_stand_ins(project: Path) -> Path:
-    """Give the small project stand-ins of its own, to be damaged."""
+    """Give the small project its own stand-ins, so that a test may damage them."""
     core = project / ".platformio"
     shared = core.resolve()
     core.unlink()

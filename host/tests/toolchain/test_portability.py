@@ -1,4 +1,4 @@
-"""tools/portability.py: a machine is what it says it is, or the run says why not."""
+"""tools/portability.py: an environment has the properties it claims, or the run reports why not."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""`make lint` keeps tests to what their packages offer."""
+"""`make lint` keeps tests from using private names of the packages."""
 
 import ast
 

@@ -1,4 +1,4 @@
-"""`make test ARGS=--quick`: what is slow or in real time is left out, nothing else; slow tests begin first."""
+"""`make test ARGS=--quick` leaves out only slow and real-time tests; a full run starts with the slow tests."""
 
 import subprocess
 import sys
@@ -7,7 +7,7 @@ FILES = ("tests/toolchain/test_flash.py", "tests/toolchain/test_platformio_offli
 
 
 def collected(project, *options: str) -> list[str]:
-    """The files of the tests that would run, in their order."""
+    """Files of the tests that would run, in order."""
     command = [sys.executable, "-m", "pytest", "--collect-only", "-p", "no:cacheprovider", *options, *FILES]
     done = subprocess.run(command, cwd=project / "host", capture_output=True, text=True, check=True)
     return [line.split("::")[0] for line in done.stdout.splitlines() if "::" in line]

@@ -1,4 +1,4 @@
-"""Whether PlatformIO's registry answers: asked of servers on this computer that behave well, badly, or not at all."""
+"""Detection of PlatformIO's registry, tested with local servers that answer well, badly, or not at all."""
 
 import http.server
 import socket
@@ -18,7 +18,7 @@ def no_proxy(monkeypatch):
 
 @pytest.fixture
 def serve():
-    """Start a server with a status and body; give its address."""
+    """A function that starts a server with a fixed status and body, and returns its address."""
     servers = []
 
     def start(status: int, body: bytes) -> str:
@@ -29,7 +29,7 @@ def serve():
                 self.wfile.write(body)
 
             def log_message(self, *_):
-                """Keep the tests' output clean."""
+                """Keep the test output clean."""
 
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -44,14 +44,14 @@ def serve():
 
 @pytest.fixture
 def silent():
-    """An address that accepts connections and then says nothing."""
+    """An address that accepts connections but never answers."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         yield f"http://127.0.0.1:{listener.getsockname()[1]}/"
 
 
 @pytest.fixture
 def closed():
-    """An address at which nobody listens."""
+    """An address without a listener."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
     return f"http://127.0.0.1:{port}/"

@@ -1,4 +1,4 @@
-"""The stand-in packages are what PlatformIO itself takes for installed ones, at the versions it asks for."""
+"""PlatformIO accepts the stand-in packages as installed, at the versions it requires."""
 
 import configparser
 import json
@@ -53,7 +53,7 @@ def test_platformio_finds_the_dac_library_that_the_project_names(laid_out, proje
 def test_the_true_origin_stays_visible(laid_out):
     for label in laid_out.rglob(".piopm"):
         version = json.loads(label.read_text())["version"]
-        assert "+" in version, f"{label.parent} does not say what it really is"
+        assert "+" in version, f"{label.parent} does not say that it is a stand-in"
 
 
 def test_each_stand_in_platform_matches_its_manifest(laid_out):

@@ -1,4 +1,4 @@
-"""tools/system-packages.sh: what is missing is installed where that is allowed, and named in one line where not."""
+"""tools/system-packages.sh installs missing packages if permitted, and otherwise lists them in one line."""
 
 import shutil
 import subprocess

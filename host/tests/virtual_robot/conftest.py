@@ -1,4 +1,4 @@
-"""Tiny images for the simulated chip, compiled where the tests run."""
+"""Fixtures: tiny images for the simulated chip, compiled by the tests."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def board(image: Callable[[str], Path]) -> Iterator[Callable[..., Uno]]:
 
 @pytest.fixture
 def serve(tmp_path: Path) -> Iterator[Callable[[VirtualRig], tuple[Path, deque[dict]]]]:
-    """Serve a rig on a pty, in a thread of its own; gives the port and the rig's last status."""
+    """A function that serves a rig on a pty in its own thread; it returns the port and the rig's latest status."""
 
     @contextmanager
     def served(rig: VirtualRig) -> Iterator[tuple[Path, deque[dict]]]:

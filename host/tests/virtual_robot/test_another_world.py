@@ -1,4 +1,4 @@
-"""Three worlds share no line of arithmetic: the host's model, the virtual robot, and the foreign truth.
+"""The host's model, the virtual robot and the foreign truth share no line of arithmetic.
 
 Lines are compared within one language: C with C, Python with Python. (That neither package imports the other is a
 rule of `make lint`; that the equations agree is test_two_implementations.)
@@ -20,7 +20,7 @@ MODEL = (HOST / "robot", HOST / "simulate", HOST / "effects")
 
 
 def arithmetic(folders: tuple[Path, ...], pattern: str) -> set[str]:
-    """Lines that compute something, without spaces and comments."""
+    """Lines with arithmetic, stripped of spaces and comments."""
     lines = set()
     for file in (file for folder in folders for file in folder.rglob(pattern)):
         for line in file.read_text().splitlines():

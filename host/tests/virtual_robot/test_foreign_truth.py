@@ -1,4 +1,4 @@
-"""The foreign truth: its physics against limits and another implementation, its data against the contract."""
+"""The foreign truth: physics against limits and the plant's implementation, data against the contract."""
 
 import tomllib
 
@@ -17,7 +17,7 @@ from virtual_robot.truths.foreign.effects import EFFECTS, LIBRARY, OUTSIDE, REME
 from virtual_robot.truths.foreign.robot import draw_robot, spring_force
 from virtual_robot.truths.foreign.trial import CHAMBERS, Edge, run, spring_newton, throat_psi_s
 
-NOISE = {"displacement": 0.09, "force": 0.17, "pressure": 0.075}  # mm, N, psi: in the middle of what is drawn
+NOISE = {"displacement": 0.09, "force": 0.17, "pressure": 0.075}  # mm, N, psi: in the middle of the ranges drawn from
 FORMS = [(name, form) for name, effect in EFFECTS.items() for form in effect.forms]
 
 
@@ -44,10 +44,10 @@ def step(robot: dict, chamber: str = "body", end_s: float = 8.0, **trial) -> np.
 
 
 def test_an_undamped_snap_conserves_energy(robot):
-    """Blown over and vented, without damper it swings through both stable states for ever."""
+    """Inflated past the snap and vented, it swings through both stable states forever without a damper."""
     edges = [Edge(0.0, "body", "positive"), Edge(0.4, "body", "off")]
     trial = {"experiment": "step_response", "start": "off", "frictionless": True, "tolerance": 0.01}
-    rows = run(robot, trial, edges, np.linspace(0.0, 13.0, 1301)).rows[1201:]  # the last second: no air is left
+    rows = run(robot, trial, edges, np.linspace(0.0, 13.0, 1301)).rows[1201:]  # the last second, when no air is left
     assert rows["head_m"].min() < 0.0 < robot["spring"][0]["extended_m"] < rows["head_m"].max()
     assert np.ptp(rows["energy_J"]) < 1e-4 * rows["energy_J"].mean()
 
@@ -76,9 +76,9 @@ def test_the_throat_keeps_the_limits_of_iso_6358():
     up = 8.5 + 14.7
     choked = throat_psi_s(conductance, critical, 8.5, critical * up - 14.7)
     assert choked == pytest.approx(conductance * up)
-    assert throat_psi_s(conductance, critical, 8.5, -14.7) == pytest.approx(choked)  # no more below the critical ratio
+    assert throat_psi_s(conductance, critical, 8.5, -14.7) == pytest.approx(choked)  # constant below the critical ratio
     assert throat_psi_s(conductance, critical, 8.5, 8.5) == 0.0
-    half = 14.7 * 0.0 + (critical + 0.5 * (1 - critical)) * up - 14.7  # half way: the quarter of an ellipse
+    half = 14.7 * 0.0 + (critical + 0.5 * (1 - critical)) * up - 14.7  # half way along the quarter of an ellipse
     assert throat_psi_s(conductance, critical, 8.5, half) == pytest.approx(choked * np.sqrt(0.75))
     assert throat_psi_s(conductance, critical, half, 8.5) == pytest.approx(-choked * np.sqrt(0.75))
 
@@ -110,11 +110,11 @@ def test_the_usual_tolerance_lies_far_under_the_noise(robot):
         for looser in (usual, half):
             assert np.abs(looser["head_m"] - tight["head_m"]).max() < 2e-5  # the camera's noise is 9e-5
             difference = looser["pressure_psi"] - tight["pressure_psi"]
-            assert np.sqrt(np.mean(difference**2)) < 1.5e-3  # the sensor's 0.07
+            assert np.sqrt(np.mean(difference**2)) < 1.5e-3  # the sensor's noise is 0.07
 
 
 def plant_of(robot: dict) -> Plant:
-    """The other implementation with the same numbers, its springs as tables of the truss."""
+    """The plant with the same parameters, its springs tabulated from the truss."""
     curves = []
     for small, (low, high) in enumerate(((-0.008, 0.064), (-0.005, 0.037))):
         x = np.linspace(low, high, 250)
@@ -151,7 +151,7 @@ def test_without_effects_two_implementations_walk_alike(robot):
 
 
 def test_without_effects_two_implementations_step_alike(robot):
-    alike = robot | {"stand_mass_kg": robot["half_mass_kg"][0]}  # the plant's stand carries half a robot
+    alike = robot | {"stand_mass_kg": robot["half_mass_kg"][0]}  # on the plant's stand, half the robot moves
     for chamber in ("body", "head"):
         plant = plant_of(alike)
         plant.mount("step_response", chamber, "vacuum")
@@ -171,11 +171,11 @@ def test_the_truss_is_the_same_in_c_and_python_and_the_papers_polynomial_can_hol
             force = spring_force(robot["spring"][small], x)
             np.testing.assert_allclose(spring_newton(robot, bool(small), x), force, atol=1e-9)
             fitted = np.polynomial.Chebyshev.fit(x, force, 15)
-            assert np.abs(fitted(x) - force).max() < 0.05  # a third of the load cell's noise: a robot of eq. (1)
+            assert np.abs(fitted(x) - force).max() < 0.05  # a third of the load cell's noise: eq. (1) describes it
 
 
 def test_friction_that_depends_on_speed_and_direction_never_slides_harder_than_it_sticks(robot):
-    """A kinetic friction above the static one would stop and start for ever."""
+    """Kinetic friction never exceeds static friction, which would make the robot stick and slip forever."""
     both = robot | {"stribeck_form": 1, "stribeck_m_s": 0.008, "direction_static": 0.07, "direction_kinetic": 0.13}
     assert walk(both)["head_m"][-1] > 0.02
 
@@ -228,7 +228,7 @@ def test_noise_is_colored_as_it_says():
     power = np.abs(np.fft.rfft(flicker(1.0, 2**16, random))) ** 2
     frequency = np.arange(len(power))
     bands = [power[(frequency >= f) & (frequency < 2 * f)].mean() for f in (64, 4096)]
-    assert 25 < bands[0] / bands[1] < 160  # 64 if it were 1/f exactly
+    assert 25 < bands[0] / bands[1] < 160  # 64 for exact 1/f noise
 
 
 # --- data sets --------------------------------------------------------------------------------------------------
@@ -266,7 +266,7 @@ def test_the_command_names_what_it_does_not_know(tmp_path, capsys):
     assert main([*foreign, "--effect", "leak", "--form", "magic"]) == 2
     assert "leak has no form 'magic'; there are orifice" in capsys.readouterr().err
     assert main(["--seed", "1", "--out", str(tmp_path / "new"), "--effect", "leak", "--form", "orifice"]) == 2
-    assert "--form is for --truth foreign" in capsys.readouterr().err
+    assert "--form needs --truth foreign" in capsys.readouterr().err
     (tmp_path / "there").mkdir()
     assert main(["--truth", "foreign", "--seed", "1", "--out", str(tmp_path / "there")]) == 2
     assert "never overwritten" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""However a command of ours ends, the robot on the rig stands afterwards: the real firmware behind a real pty."""
+"""However a command ends, the robot on the rig is stopped afterwards (real firmware behind a real pty)."""
 
 import contextlib
 import fcntl
@@ -18,7 +18,7 @@ from virtual_robot.rig import open_rig
 
 pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 
-SETTLED_S = 0.3  # of the rig's time: what was under way has arrived
+SETTLED_S = 0.3  # in the rig's time, until everything in flight has arrived
 RAISING = """
 import sys
 from bifa.link import Uno
@@ -32,7 +32,7 @@ with SerialRig(sys.argv[1]) as rig, Uno(rig.transport, rig.clock) as uno:
 
 
 class Bench:
-    """The virtual robot on a pty in a thread of its own, watched from outside."""
+    """The virtual robot on a pty in its own thread, observed from outside."""
 
     def __init__(self, port: Path, status: deque[dict], gait: str) -> None:
         self.port, self.folder, self.gait, self._status = str(port), port.parent, gait, status
@@ -81,7 +81,7 @@ def exception(bench: Bench, rng: random.Random) -> subprocess.Popen:
 
 
 def output_that_nobody_reads_any_more(bench: Bench, rng: random.Random) -> subprocess.Popen:
-    """As `| head -1` leaves it."""
+    """Close the reader of the output, as `| head -1` does."""
     program = bench.start("console", stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     program.stdin.write("run\n")
     program.stdin.flush()
@@ -94,7 +94,7 @@ def output_that_nobody_reads_any_more(bench: Bench, rng: random.Random) -> subpr
 
 
 def full_pipe(bench: Bench, rng: random.Random) -> subprocess.Popen:
-    """Nobody reads, until the command cannot write any more; then `kill`."""
+    """Leave the output unread until the command blocks on writing; then `kill` it."""
     program = bench.start("console", stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     fcntl.fcntl(program.stdout, fcntl.F_SETPIPE_SZ, 4096)
     program.stdin.write("run\n" + "help\n" * 40)
@@ -106,7 +106,7 @@ def full_pipe(bench: Bench, rng: random.Random) -> subprocess.Popen:
 
 
 def signalled(number: int, command: str) -> Callable[[Bench, random.Random], subprocess.Popen]:
-    """A signal at any moment, from before the program has begun to after it has walked for a while."""
+    """Return a way out: a signal at any moment, from before the program starts to after it has walked for a while."""
 
     def leave(bench: Bench, rng: random.Random) -> subprocess.Popen:
         recording = ["record", "--out", str(bench.folder / f"out{time.monotonic_ns()}"), "--gait"]

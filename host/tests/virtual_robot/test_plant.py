@@ -1,4 +1,4 @@
-"""The plant alone: the paper's walk, friction, springs, air, and convergence of its integrator."""
+"""The plant alone: the paper's walk, friction, springs, air, and the integrator's convergence."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from virtual_robot.plant import NOMINAL, Plant, PlantParameterError, nominal_cur
 
 
 def walk(gait: Gait, cycles: int, parameters=NOMINAL, step_s: float | None = None) -> np.ndarray:
-    """Record at 100 Hz."""
+    """Record of a walk, at 100 Hz."""
     plant = Plant(parameters)
     plant.mount("locomotion")
     if step_s is not None:
@@ -42,7 +42,7 @@ def test_the_same_trial_twice_is_the_same_to_the_bit():
 
 
 def test_energy_only_goes_down_without_air():
-    """Released from beyond the unstable point, vented: the spring snaps over and everything is dissipated."""
+    """Released beyond the unstable point and vented, the spring snaps over and all its energy is dissipated."""
     plant = Plant(NOMINAL)
     plant.mount("step_response", "body", "vacuum")
     plant.connect(0.0, "body", "off")
@@ -51,7 +51,7 @@ def test_energy_only_goes_down_without_air():
         plant.record([k * 0.005 + 0.5])
         energy.append(plant.energy_joule)
     assert energy[0] > 0
-    # The chamber still empties while it springs back; from then on nothing feeds it.
+    # The chamber still empties during the snap; from then on nothing adds energy.
     assert np.all(np.diff(energy[100:]) <= 1e-9)
 
 
@@ -129,7 +129,7 @@ def test_every_effect_changes_what_is_measured(name):
     assert difference > 3.0
 
 
-CHANNELS = {"head_m": 1e-4, "tail_m": 1e-4, "force_N": 0.15, "pressure_psi": 0.06}  # with their noise
+CHANNELS = {"head_m": 1e-4, "tail_m": 1e-4, "force_N": 0.15, "pressure_psi": 0.06}  # channels and their noise
 
 
 def test_a_worn_robot_walks_too_and_its_air_is_compressible():

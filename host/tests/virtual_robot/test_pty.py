@@ -1,4 +1,4 @@
-"""The bench as a serial port: any program can open it, opening resets the board, and it ends cleanly."""
+"""The bench as a serial port: any program can open it, opening it resets the board, and it ends cleanly."""
 
 import os
 import time
@@ -33,7 +33,7 @@ def wait_for(port: serial.Serial, count: int) -> bytes:
 def test_pyserial_talks_to_the_board(rig, serve):
     link, _ = serve(rig)
     with serial.Serial(str(link), 250000) as port:
-        assert wait_for(port, 1) == b"B"  # the board has been reset by the opening
+        assert wait_for(port, 1) == b"B"  # opening the port has reset the board
         port.write(bytes(range(32, 127)))
         assert wait_for(port, 95) == bytes(range(32, 127))
 

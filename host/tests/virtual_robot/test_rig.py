@@ -1,4 +1,4 @@
-"""The bench in process: virtual time, transport, valves to pressures, instruments with clocks of their own."""
+"""The bench in this process: virtual time, transport, valves and pressures, instruments with their own clocks."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from virtual_robot.rig import open_rig
 
 pytestmark = pytest.mark.uno
 
-# A stand-in for the firmware: the byte is the valve port's state (bits 0-5: D4-D9), and the DAC is set to 268.
-# 100 times a second the strobe goes up, A0-A2 are converted and their counts are sent.
+# A stand-in for the firmware: a received byte is the valve port's state (bits 0-5: D4-D9), and the DAC is set to 268.
+# 100 times a second, the strobe rises, A0-A2 are converted and their counts are sent.
 BENCH = """
 static volatile uint8_t round_due;
 ISR(TIMER1_COMPA_vect) { round_due = 1; }
@@ -51,7 +51,7 @@ def bench(image):
 
 
 def psi(rig, after_s: float) -> np.ndarray:
-    """The last reading that has been sent by then, three chambers."""
+    """The latest reading of the three chambers after another `after_s`, in psi."""
     rig.clock.sleep(after_s)
     rig.transport.read(0)
     data = rig.transport.read(0.05)
@@ -101,7 +101,7 @@ def test_valves_fill_chambers_and_sensors_tell(bench):
     assert psi(rig, 3.0) == pytest.approx([8.5, 0, 0], abs=0.3)
     rig.transport.write(BODY_DOWN)
     assert psi(rig, 9.0) == pytest.approx([-13, 0, 0], abs=0.4)
-    rig.transport.reset()  # the valves fall with the reset
+    rig.transport.reset()  # the reset turns the valves off
     assert psi(rig, 4.0) == pytest.approx([0, 0, 0], abs=0.3)
     assert rig.plant.both_valves == 0
 
@@ -150,7 +150,7 @@ def test_a_camera_runs_on_its_own_clock_and_the_strobe_lines_it_up(bench):
     sync = record["sync_time_s"]
     assert len(sync) == len(rises)
     rate, offset = np.polyfit(sync, rises, 1)
-    assert offset < -0.1 or offset > 0.1  # not the Uno's zero
+    assert offset < -0.1 or offset > 0.1  # the camera's zero is not the Uno's
     assert rate == pytest.approx(1.0023, abs=1.5e-4)  # the Uno's resonator is 0.23 % fast
     assert np.std(np.array(rises) - offset - rate * sync) < 5e-5
     assert np.diff(record["time_s"]) == pytest.approx(0.01, abs=1e-9)

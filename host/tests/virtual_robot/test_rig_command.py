@@ -1,4 +1,4 @@
-"""`bifa rig` as a person uses it: it says where the port is, serves it, and Ctrl-C leaves nothing behind."""
+"""`bifa rig` as a user runs it: it prints the port, serves it, and leaves nothing behind on Ctrl-C."""
 
 import shlex
 import signal
@@ -39,10 +39,10 @@ def test_serve_and_stop(image, tmp_path, ending):
         (["--firmware", "missing.elf"], "pio run -e uno"),
         (["--effect", "leak:much"], "NAME:PARAMETER=VALUE"),
         (["--profile", "perfect"], "'perfect' is not one of"),
-        (["--link", __file__], "no symbolic link"),
+        (["--link", __file__], "not a symbolic link"),
         (["--link", "/nowhere/uno"], "does not exist; create it first"),
         (["--eeprom", "/nowhere/uno.bin"], "does not exist; create it first"),
-        (["--eeprom", __file__], "is no EEPROM file"),
+        (["--eeprom", __file__], "is not an EEPROM file"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_line(arguments, message, image):

@@ -1,4 +1,4 @@
-"""The C parts under AddressSanitizer and UBSan: no stray access, no undefined behaviour, no leak of their own."""
+"""The C parts under AddressSanitizer and UBSan have no stray access, undefined behaviour or leak."""
 
 import os
 import subprocess
@@ -22,14 +22,14 @@ MODEST = 0.5
 
 
 def initializer(value: Any) -> str:
-    """Of a C constant: a number, a sequence, or a struct's fields by name."""
+    """C initializer of a number, a sequence, or a struct given by field names."""
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'.{name} = {initializer(field)}' for name, field in value.items())}}}"
     return f"{{{', '.join(map(initializer, value))}}}" if np.ndim(value) or isinstance(value, list) else f"{value}"
 
 
 def foreign_robots() -> list[dict[str, Any]]:
-    """Each with every effect at once, so many that every form of each is among them."""
+    """Robots with all effects at once; as many as are needed to cover every form of each effect."""
     random, forms = np.random.default_rng(1), [list(effect.forms.values()) for effect in effects.EFFECTS.values()]
     robots = [draw_robot(random) for _ in range(max(map(len, forms)))]
     for number, robot in enumerate(robots):
@@ -39,7 +39,7 @@ def foreign_robots() -> list[dict[str, Any]]:
 
 
 def constants() -> str:
-    """What main.c includes as robots.h."""
+    """Contents of robots.h, which main.c includes."""
     found = {"PlantParameters PLANT": NOMINAL | plant_parameters({name: {} for name in EFFECTS})}
     for name, curve in zip(("BODY", "SMALL"), nominal_curves(), strict=True):
         found |= {f"double {name}_FORCE_N[]": curve.force_N, f"double {name}_FIRST_M": curve.first_m}

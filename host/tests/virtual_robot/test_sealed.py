@@ -1,4 +1,4 @@
-"""Sealed data sets: format, sealing, determinism, and that the label is all that tells them apart."""
+"""Sealed data sets: format, sealing, determinism, and that only the label reveals the effects."""
 
 import tomllib
 

@@ -1,4 +1,4 @@
-"""Sealed robots measured through the firmware: the realistic truth."""
+"""The realistic truth: sealed robots measured through the firmware."""
 
 import tomllib
 

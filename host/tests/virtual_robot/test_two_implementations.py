@@ -1,8 +1,8 @@
 """The host's simulator and the virtual robot's plant share no code and agree on every effect of the contract.
 
-The one is linearly implicit with a polynomial spring, the other explicit with event location and a spline; so what
-they agree on is the equations. Given the true parameters, the simulator must predict the plant's noiseless records
-to a fraction of the sensors' noise.
+The simulator is linearly implicit with a polynomial spring, the plant explicit with event location and a spline;
+only the equations are common to both. Given the true parameters, the simulator must predict the plant's noiseless
+records to a fraction of the sensors' noise.
 """
 
 from dataclasses import replace
@@ -35,7 +35,7 @@ PLANS = (
 
 
 class Nothing:
-    """A random generator without chance: no wobble, phases of 0."""
+    """A random generator that draws only zeros: no wobble, phases of 0."""
 
     def standard_normal(self, shape=()):
         return np.zeros(shape)
@@ -89,7 +89,7 @@ def test_agreement_to_a_fraction_of_the_noise(model, effect, monkeypatch):
 
 @pytest.mark.parametrize("difference_s", [0.034, -0.034])
 def test_late_valves_agree_where_chambers_are_vented_between_supplies(model, difference_s):
-    """As the Uno does it: break before make. A valve that closes is not late because the one that opens is."""
+    """Chambers are vented before switching, as by the Uno; a late opening valve does not delay the closing one."""
     dead_time_s, effects = 0.004, {"valve_asymmetry": {"difference_s": difference_s}}
     time_s = np.arange(round(2 * EASY.period_s * 100)) / 100
     switches = EASY.switches(2 * EASY.period_s)
@@ -113,7 +113,7 @@ def test_late_valves_agree_where_chambers_are_vented_between_supplies(model, dif
 
 @pytest.mark.parametrize("effect", ["backlash", "hysteresis"])
 def test_a_spring_that_remembers_agrees_on_how_the_head_was_extended(model, effect):
-    """As bifa's own experiment does it: snapped out by pressure, vented, and pulled."""
+    """The head is snapped out by pressure, vented, and pulled, as in bifa's own experiment; this history matters."""
     effects, time_s = {effect: EFFECTS[effect].defaults()}, np.arange(100) / 50
     plant = Plant(NOMINAL | plant_parameters(effects))
     plant.mount("anchor_pull", "head", "positive")
@@ -130,7 +130,7 @@ def test_a_spring_that_remembers_agrees_on_how_the_head_was_extended(model, effe
 
 
 def test_the_wrong_effect_does_not_agree(model):
-    """The comparison above can fail: without its effect the simulator misses the record by far."""
+    """The comparison above can fail: without the effect, the simulator misses the record by far."""
     lab = Lab(NOMINAL | plant_parameters({"hysteresis": {}}), noise=Noise(0, 0, 0, 0))
     seen = lab.run(PLANS[0], 0.0, Nothing())
     miss = seen["force_N"] - predicted(model, PLANS[0], seen)["force_N"]

@@ -1,4 +1,4 @@
-"""The simulated ATmega328P where libsimavr had to be put right: time, pins, resets, interrupts, sleep."""
+"""The simulated ATmega328P where libsimavr needed corrections: time, pins, resets, interrupts, sleep."""
 
 import itertools
 
@@ -157,7 +157,7 @@ def test_without_power_time_passes_and_nothing_runs(board):
     uno.run_for(0.01)
     assert not uno.powered
     assert uno.event_count == count
-    uno.reset("external")  # a button without power does nothing
+    uno.reset("external")  # the reset button does nothing without power
     uno.run_for(0.01)
     assert uno.event_count == count
     uno.reset("power-on")

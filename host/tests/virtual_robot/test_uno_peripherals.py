@@ -49,9 +49,9 @@ int main(void) {
   for (;;) {}
 }
 """)
-    uno.send(b"12345")  # 200 us: all there before the chip looks
+    uno.send(b"12345")  # 200 us: all have arrived before the chip reads
     uno.run_for(0.01)
-    assert uno.receive() == b"R1.2.5!"  # two buffered; of the shift register's three only the last is left
+    assert uno.receive() == b"R1.2.5!"  # two buffered; of the other three, the shift register keeps the last
     assert uno.rx_overruns == 2
 
 
@@ -211,7 +211,7 @@ int main(void) { if (MCUSR & 1) { MCUSR = 0; eeprom_write_byte((uint8_t *)3, 7);
 def test_a_file_that_is_no_eeprom_is_refused_and_stays(board, tmp_path, size):
     file = tmp_path / "thesis.tex"
     file.write_bytes(b"x" * size)
-    with pytest.raises(VirtualRobotError, match="is no EEPROM file, which has 1024 bytes"):
+    with pytest.raises(VirtualRobotError, match="is not an EEPROM file of 1024 bytes"):
         board(EEPROM, eeprom=file)
     with pytest.raises(VirtualRobotError, match="create it first"):
         board(EEPROM, eeprom=tmp_path / "no" / "eeprom.bin")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stand: mount an experiment, start the instrument, let it run, stop it, take its record."""
+"""The test stand: mount an experiment, start its instrument, let time pass, stop it and take the record."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from virtual_robot.plant import Plant
 CAMERA_HZ, MACHINE_HZ = 100.0, 50.0
 _SYNC_JITTER_S = 2e-5
 _PULL_MM = 60.0
-_DAY_S = 1500.0  # what drifts over the day has come to its end: 45 trials take about so long
+_DAY_S = 1500.0  # about the duration of 45 trials, after which drifts have run their course
 _CHAMBERS = {"large": "body", "small": "head"}
-_SETTINGS: dict[str, dict[str, Any]] = {  # with their usual values; None = must be given
+_SETTINGS: dict[str, dict[str, Any]] = {  # with their defaults; None = required
     "locomotion": {"inclination_deg": 0.0},
     "step_response": {"actuator": None},
     "static_loading": {"actuator": None, "rate_mm_s": 2.0},
@@ -26,12 +26,12 @@ _SETTINGS: dict[str, dict[str, Any]] = {  # with their usual values; None = must
 
 
 class StandError(VirtualRobotError, ValueError):
-    """The stand cannot do what was asked."""
+    """The stand cannot carry out the request."""
 
 
 @dataclass(frozen=True)
 class InstrumentClock:
-    """An instrument's own clock: own = offset_s + (1 + drift) (true - start_s), in steps of `resolution_s`, if any."""
+    """An instrument's clock: own = offset_s + (1 + drift) (true - start_s), in steps of `resolution_s` (0: none)."""
 
     start_s: float
     offset_s: float
@@ -40,7 +40,7 @@ class InstrumentClock:
 
     @classmethod
     def draw(cls, start_s: float, random: np.random.Generator, resolution_s: float) -> InstrumentClock:
-        """Switched on at some earlier moment; crystal oscillators differ by some 30 ppm."""
+        """Draw a clock that was switched on at some earlier moment; crystal oscillators differ by some 30 ppm."""
         return cls(start_s, float(random.uniform(0.0, 100.0)), float(3e-5 * random.standard_normal()), resolution_s)
 
     def own(self, true_s: np.ndarray) -> np.ndarray:
@@ -53,12 +53,12 @@ class InstrumentClock:
 
 @dataclass(eq=False)
 class Instruments:
-    """Instruments around one plant that is wired to a board. `world` tells the time and the board's cycle."""
+    """The instruments around one plant that is wired to a board. `world` provides the time and the board's cycle."""
 
     _world: Any
     _plant: Plant
     _noise: Noise
-    _wobble: float  # of the friction, from run to run
+    _wobble: float  # run-to-run sd of the friction factor
     _random: np.random.Generator
     _clock_resolution_s: float
     mounted_s: float = 0.0
@@ -94,7 +94,7 @@ class Instruments:
         self._plant.watch(period_s, self._now_s + float(self._random.uniform(0.0, period_s)))
 
     def move(self) -> None:
-        """Set the cross-head in motion: to the extended state and back, or the pull."""
+        """Start the cross-head: to the extended state and back, or the pull."""
         if self._experiment not in ("static_loading", "anchor_pull"):
             raise StandError(f"{self._experiment} has no cross-head; mount static_loading or anchor_pull first")
         rate_m_s = self._settings["rate_mm_s"] * 1e-3
@@ -103,13 +103,14 @@ class Instruments:
 
     @property
     def moving(self) -> bool:
-        """Whether the cross-head is under way."""
+        """Whether the cross-head is moving."""
         self._plant.advance(self._now_s)
         return self._plant.moving
 
     def stop(self) -> dict[str, np.ndarray]:
-        """End the record: `time_s` and `sync_time_s` (rising edges of the strobe) by its own clock, and what it
-        measured: displacement_head_mm and displacement_tail_mm (locomotion), displacement_mm, force_N."""
+        """End the record and return it: `time_s` and `sync_time_s` (rising edges of the strobe) by the instrument's
+        clock, and displacement_head_mm and displacement_tail_mm (locomotion) or displacement_mm, with force_N from the
+        machines."""
         if self.clock is None:
             raise StandError("no record has been started")
         self._plant.advance(self._now_s)
@@ -125,7 +126,7 @@ class Instruments:
         }
 
     def position_mm(self) -> dict[str, float]:
-        """Where the camera sees head and tail at this moment; takes no part in a record."""
+        """Positions of head and tail as the camera sees them now, without noise; independent of any record."""
         row = self._plant.sample(self._now_s)
         return {end: float(1e3 * row[f"{end}_m"]) for end in ("head", "tail")}
 

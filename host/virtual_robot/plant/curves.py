@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stiffness curves as tables of measured points; the plant lays a cubic spline through them."""
+"""Stiffness curves as tables of measured points, which the plant interpolates by a cubic spline."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FOLDER = Path(__file__).parent / "curves"
 
 @dataclass(frozen=True)
 class Curve:
-    """Force [N] at even displacements [m]; 0 at the contracted stable state, positive when extending."""
+    """Force [N] at equidistant displacements [m]; 0 at the contracted stable state, positive when extending."""
 
     first_m: float
     step_m: float
@@ -25,10 +25,10 @@ class Curve:
         return self.first_m + self.step_m * np.arange(len(self.force_N))
 
     def deformed(self, tilt: float, bend: float, height: float) -> Curve:
-        """Another specimen: the force times 1 + height + tilt z + bend (2 z^2 - 1), z in -1..1 over the table.
+        """Another specimen's curve: the force times 1 + height + tilt z + bend (2 z^2 - 1), z in -1..1 over the table.
 
-        The equilibria stay where they are. The result is smoothed to a polynomial of degree 15, which is what
-        the paper found enough for its measured curves.
+        The equilibria stay where they are. The result is smoothed by a polynomial of degree 15, which the paper
+        found sufficient for its measured curves.
         """
         z = np.linspace(-1.0, 1.0, len(self.force_N))
         force = self.force_N * (1.0 + height + tilt * z + bend * (2.0 * z**2 - 1.0))

@@ -10,7 +10,7 @@ class PlantParameterError(VirtualRobotError, ValueError):
     """A parameter or effect that the plant does not have."""
 
 
-# Displacements are counted from the contracted stable state, so the wall lies 0.10 mm nearer than in a curve
+# Displacements are counted from the contracted stable state, so the wall is 0.10 mm nearer than for a curve
 # whose polynomial crosses zero there.
 NOMINAL: dict[str, float] = {
     "head_mass_kg": 0.175,
@@ -36,9 +36,9 @@ NOMINAL: dict[str, float] = {
     "friction_factor": 1.0,
 }
 
-# A robot that has seen years, beyond the paper's equations in several ways at once: ISO 6358 flow, MHE3 switching times
-# (data sheet: about 2 ms both ways), an ITV1050 that needs 0.15 s and hunts, the loop of the paper's Fig. 5, and a
-# sensor with a tube before it.
+# A robot after years of use, beyond the paper's equations in several ways at once: ISO 6358 flow, MHE3 switching times
+# (data sheet: about 2 ms both ways), an ITV1050 that needs 0.15 s and hunts, the hysteresis loop of the paper's Fig. 5,
+# and a sensor at the end of a tube.
 _WORN: dict[str, float] = {
     "iso6358_share": 1.0,
     "iso6358_critical_ratio": 0.35,
@@ -53,13 +53,13 @@ _WORN: dict[str, float] = {
     "sensor_lag_time_s": 0.008,
     "sensor_calibration_offset_psi": 0.05,
 }
-# What the plant does. "realistic" has the paper's equations: what is real are its instruments and clocks (rig.py), so
-# that a robot without an effect has none.
+# Departures of the plant. "realistic" keeps the paper's equations: its realism is in instruments and clocks (rig.py),
+# so a robot without an effect has no model error.
 _PROFILES = {"ideal": {}, "realistic": {}, "worn": _WORN}
 
 
 def profile(name: str) -> dict[str, float]:
-    """Parameters of the plant in a profile, "ideal", "realistic" or "worn"; what is absent is 0."""
+    """Plant parameters of a profile, "ideal", "realistic" or "worn"; parameters not listed are 0."""
     if name not in _PROFILES:
         raise PlantParameterError(f"no profile {name!r}; there are {', '.join(_PROFILES)}")
     return NOMINAL | _PROFILES[name]

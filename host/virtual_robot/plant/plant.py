@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The plant as Python sees it: a time line of valve commands in, a record of every channel out."""
+"""Python interface of the plant: valve commands over time in, a record of every channel out."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ SAMPLE = np.dtype(
 
 
 class Plant:
-    """One robot with its air and stands. `parameters`: names of PlantParameters in plant.h; absent = 0."""
+    """One robot with its air supply and stands. `parameters`: fields of PlantParameters in plant.h; 0 if not given."""
 
-    _plant: Any = None  # until it is made
+    _plant: Any = None  # until it is created
 
     def __init__(self, parameters: Mapping[str, float] = NOMINAL, curves: tuple[Curve, Curve] | None = None) -> None:
         if lib is None:
@@ -67,21 +67,21 @@ class Plant:
     # --- stand ------------------------------------------------------------------------------------------
 
     def mount(self, experiment: str, chamber: str = "body", start: str = "off") -> None:
-        """Put an experiment on the stand at rest; `start` has been connected until everything settled."""
+        """Put an experiment on the stand, at rest after settling with `start` connected."""
         lib.plant_mount(self._plant, EXPERIMENTS.index(experiment), CHAMBERS.index(chamber), STATES.index(start))
 
     def set_trial(
         self, friction_factor: float, inclination_deg: float, ripple_phase_rad: float, session_share: float
     ) -> None:
-        """What differs from trial to trial; takes effect with the next mount."""
+        """Set what differs from trial to trial; takes effect with the next `mount`."""
         lib.plant_set_trial(self._plant, friction_factor, inclination_deg, ripple_phase_rad, session_share)
 
     def set_step(self, step_s: float) -> None:
-        """Greatest step of the integrator, until the next mount."""
+        """Set the largest step of the integrator, until the next `mount`."""
         lib.plant_set_step(self._plant, step_s)
 
     def connect(self, time_s: float, chamber: str, state: str) -> None:
-        """Command a chamber's valves from `time_s` on; commands come in the order of time."""
+        """Command a chamber's valves from `time_s` on; commands must come in time order."""
         lib.plant_connect(self._plant, time_s, CHAMBERS.index(chamber), STATES.index(state))
 
     def move(self, start_s: float, travel_m: float, rate_m_s: float, there_and_back: bool) -> None:
@@ -93,7 +93,7 @@ class Plant:
         return bool(lib.plant_moving(self._plant))
 
     def record(self, times: Iterable[float] | np.ndarray) -> np.ndarray:
-        """Samples at even, increasing times [s]; array of dtype SAMPLE."""
+        """Samples at equidistant, increasing times [s]; array of dtype SAMPLE."""
         times = np.asarray(times, float)
         rows = np.zeros(len(times), SAMPLE)
         period = times[1] - times[0] if len(times) > 1 else 0.0
@@ -106,7 +106,7 @@ class Plant:
         return np.array([lib.plant_spring(self._plant, small, float(x)) for x in np.ravel(displacement_m)])
 
     def landmarks_m(self, small: bool) -> tuple[float, float, float]:
-        """Contracted, unstable and extended equilibrium."""
+        """Displacements of the contracted, unstable and extended equilibria."""
         out = ffi.new("double[3]")
         lib.plant_landmarks(self._plant, small, out, out + 1, out + 2)
         return out[0], out[1], out[2]
@@ -118,14 +118,14 @@ class Plant:
     # --- wired to the Uno -------------------------------------------------------------------------------
 
     def wire(self, uno: Any, clock_hz: float, noise_seed: int, noise_psi: float, noise_memory_s: float = 0.0) -> None:
-        """Connect valves, strobe, sensors and DAC to a board; from now on the board's cycles are time."""
+        """Connect valves, strobe, sensors and DAC to a board; from now on the board's cycles define the time."""
         lib.plant_wire(self._plant, uno.cycle, clock_hz, noise_seed, noise_psi, noise_memory_s)
         callbacks = (lib.plant_pin_changed_address, lib.plant_analog_volts_address, lib.plant_dac_changed_address)
         pointers = (self._plant, *(callback() for callback in callbacks))
         uno.connect(*(int(ffi.cast("uintptr_t", pointer)) for pointer in pointers))
 
     def remount(self, experiment: str, chamber: str, cycle: int) -> None:
-        """Put another experiment on the stand while the board goes on; time is 0 at `cycle`."""
+        """Put another experiment on the stand while the board keeps running; time is 0 at `cycle`."""
         lib.plant_remount(self._plant, EXPERIMENTS.index(experiment), CHAMBERS.index(chamber), cycle)
 
     def advance(self, time_s: float) -> None:
@@ -136,7 +136,7 @@ class Plant:
         return self.record([time_s])[0]
 
     def break_sensor(self, channel: int, volts: float | None) -> None:
-        """Fix a sensor's (0-2) or the regulator monitor's (3) output; None = in order again."""
+        """Fix the output of a sensor (0-2) or of the regulator's monitor (3); None repairs it."""
         lib.plant_break_sensor(self._plant, channel, float("nan") if volts is None else volts)
 
     @property
@@ -153,11 +153,11 @@ class Plant:
         lib.plant_watch(self._plant, period_s, offset_s)
 
     def take_watched(self) -> np.ndarray:
-        """What the instrument has seen since the last call; dtype SAMPLE."""
+        """Samples that the instrument has taken since the last call; dtype SAMPLE."""
         return self._taken(lib.plant_watched, "PlantSample *", SAMPLE)
 
     def _taken(self, take: Any, pointer: str, dtype: np.dtype) -> np.ndarray:
-        """All that `take` has, block by block."""
+        """Drain `take` block by block."""
         block, parts = np.zeros(4096, dtype), [np.zeros(0, dtype)]
         while count := take(self._plant, ffi.cast(pointer, block.ctypes.data), len(block)):
             parts.append(block[:count].copy())

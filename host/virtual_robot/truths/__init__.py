@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Robots that data sets are sealed of, one a folder, none of which shares an equation with another."""
+"""Robots for sealed data sets, one per folder; no two of them share an equation."""

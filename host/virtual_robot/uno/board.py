@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated board as Python sees it. Time is CPU cycles at 16 MHz and passes only in `run_*`."""
+"""Python interface of the simulated board. Time is counted in CPU cycles at 16 MHz and passes only in `run_*`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from virtual_robot.uno import elf
 
 try:
     from virtual_robot.uno._uno import ffi, lib
-except ImportError:  # told when a board is made, so that the package imports without libsimavr
+except ImportError:  # reported when a board is created, so that the package imports without libsimavr
     ffi = lib = None
 
 CLOCK_HZ = 16_000_000
@@ -37,16 +37,16 @@ class Event:
 
 
 def _check_eeprom(file: Path) -> None:
-    """Before the board is made: the file is written when it closes, over what is there."""
+    """Raise VirtualRobotError unless the file is writable and, if it exists, an EEPROM file: closing overwrites it."""
     check_place(file, "the EEPROM file")
     if file.exists() and not (file.is_file() and file.stat().st_size == EEPROM_SIZE):
         raise VirtualRobotError(
-            f"{file} is no EEPROM file, which has {EEPROM_SIZE} bytes, and would be overwritten; choose another name"
+            f"{file} is not an EEPROM file of {EEPROM_SIZE} bytes and would be overwritten; choose another name"
         )
 
 
 def _of_status(name: str) -> property:
-    """A number that the chip's status tells."""
+    """A property that reads one number of the chip's status."""
     return property(lambda uno: getattr(uno._status(), name))
 
 
@@ -76,7 +76,7 @@ class Uno:
     # --- time -------------------------------------------------------------------------------------------
 
     def run_until(self, cycle: int, stop_on_output: bool = False) -> bool:
-        """Run to `cycle`; True if a byte sent by the chip is waiting (and, if asked, stopped the run)."""
+        """Run to `cycle`; True if a byte sent by the chip is waiting (and, with `stop_on_output`, ended the run)."""
         return lib.uno_run(self._uno, cycle, stop_on_output) == lib.UNO_OUTPUT_READY
 
     def run_for(self, seconds: float) -> None:
@@ -95,7 +95,7 @@ class Uno:
         lib.uno_uart_send(self._uno, data, len(data), baud)
 
     def receive_stamped(self) -> list[tuple[int, int]]:
-        """Bytes that have completely arrived from the chip: (cycle of the end of the stop bit, byte)."""
+        """Bytes completely received from the chip: (cycle of the end of the stop bit, byte)."""
         data, cycles = ffi.new("uint8_t[4096]"), ffi.new("uint64_t[4096]")
         got: list[tuple[int, int]] = []
         while count := lib.uno_uart_receive(self._uno, data, cycles, 4096):
@@ -112,7 +112,7 @@ class Uno:
     # --- pins, ADC, bus ---------------------------------------------------------------------------------
 
     def pin(self, pin: int) -> int | None:
-        """Level of a driven Arduino pin (0-19), None where it is an input."""
+        """Level of a driven Arduino pin (0-19); None if it is an input."""
         level = lib.uno_pin(self._uno, pin)
         return None if level < 0 else level
 
@@ -120,14 +120,14 @@ class Uno:
         lib.uno_set_input(self._uno, pin, level)
 
     def press_emergency_stop(self, pressed: bool = True) -> None:
-        """D2 to ground."""
+        """Pull D2 to ground, or release it."""
         self.set_input(2, not pressed)
 
     def set_analog(self, channel: int, volts: float) -> None:
         lib.uno_set_analog(self._uno, channel, volts)
 
     def set_bus(self, mode: str) -> None:
-        """What is on the I2C bus: "dac" (MCP4725 at 0x62), "absent", "stuck" (no answer ever), or "held"
+        """Set what is on the I2C bus: "dac" (MCP4725 at 0x62), "absent", "stuck" (no answer ever), or "held"
         (each byte is acknowledged, but the transfer cannot end)."""
         lib.uno_set_bus(self._uno, _BUS_MODES.index(mode))
 
@@ -143,23 +143,24 @@ class Uno:
     # --- resets, power, EEPROM --------------------------------------------------------------------------
 
     def reset(self, cause: str = "external", bootloader_s: float = 0.0) -> None:
-        """ "power-on", "external" (the button, DTR) or "brown-out"; a watchdog reset comes by itself.
+        """Reset the chip; `cause`: "power-on", "external" (the button, DTR) or "brown-out".
 
-        The program starts `bootloader_s` later (a real Uno waits about a second after an external reset).
+        A watchdog reset happens by itself. The program starts `bootloader_s` later (a real Uno waits about a
+        second after an external reset).
         """
         lib.uno_reset(self._uno, _RESET_CAUSES.index(cause))
         lib.uno_hold(self._uno, round(bootloader_s * CLOCK_HZ))
 
     def use_optiboot(self, use: bool = True) -> None:
-        """From the next reset on leave behind of it what the Uno's stock bootloader does (see chip.c)."""
+        """From the next reset on, leave the chip as the Uno's stock bootloader would (see chip.c)."""
         lib.uno_use_optiboot(self._uno, use)
 
     def hold(self, seconds: float) -> None:
-        """Let nothing be executed for so long, as with interrupts off; what is around the processor goes on."""
+        """Execute nothing for this long, as with interrupts off; everything around the processor keeps running."""
         lib.uno_hold(self._uno, round(seconds * CLOCK_HZ))
 
     def hang(self, interrupts: bool) -> None:
-        """Let the program loop for ever where it is now, with interrupts on or off, until the chip is reset."""
+        """Make the program loop forever where it is, with interrupts on or off, until the chip is reset."""
         lib.uno_hang(self._uno, interrupts)
 
     @property
@@ -181,7 +182,7 @@ class Uno:
         lib.uno_eeprom_load(self._uno, data, len(data))
 
     def cut_power_at_eeprom_write(self, n: int, fraction: float = 0.5) -> None:
-        """The power fails during the n-th EEPROM byte written from now, `fraction` of 3.4 ms into it."""
+        """Cut the power during the n-th EEPROM byte written from now, `fraction` of 3.4 ms into it."""
         lib.uno_eeprom_cut_power(self._uno, n, fraction)
 
     # --- looking inside ---------------------------------------------------------------------------------
@@ -220,7 +221,7 @@ class Uno:
     rx_overruns = _of_status("rx_overruns")
 
     def span(self, symbol: str) -> tuple[int, int]:
-        """Data-space or flash addresses of a symbol of the image: where it begins, where it has ended."""
+        """First and one-past-last address, in data space or flash, of a symbol of the image."""
         if self._symbols is None:
             self._symbols = elf.symbols(self.firmware)
         if symbol not in self._symbols:
@@ -233,7 +234,7 @@ class Uno:
         return self.span(symbol)[0]
 
     def peek(self, where: int | str, size: int = 1) -> bytes:
-        """RAM (and registers) from an address or a symbol."""
+        """Read RAM (and registers) from an address or a symbol."""
         data = ffi.new("uint8_t[]", size)
         lib.uno_peek_ram(self._uno, where if isinstance(where, int) else self.address(where), data, size)
         return bytes(data)
@@ -243,7 +244,7 @@ class Uno:
 
     @property
     def untouched_ram(self) -> int:
-        """Bytes between the static data and the deepest stack that nothing has written since power-on."""
+        """Bytes between the static data and the deepest stack, not written since power-on."""
         return lib.uno_untouched_ram(self._uno, self.address("_end"))
 
     @property
@@ -252,7 +253,7 @@ class Uno:
 
     @property
     def event_count(self) -> int:
-        """The number of the next event: pass it to `iter_events` later to see what came since."""
+        """The number of the next event: pass it to `iter_events` later for those that came since."""
         return lib.uno_event_count(self._uno)
 
     def iter_events(self, first: int = 0) -> Iterator[Event]:
@@ -268,7 +269,7 @@ class Uno:
     # --- end --------------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Write the EEPROM file, at once or not at all; a second call does nothing."""
+        """Free the board and write the EEPROM file atomically; a second call does nothing."""
         if self._uno is None:
             return
         if self._eeprom_file is not None:

@@ -10,7 +10,7 @@ DATA_SPACE = 0x800000  # the GNU tools put data addresses here
 
 
 def symbols(path: Path) -> dict[str, tuple[int, int]]:
-    """Name -> (address, size) of every named symbol; data addresses are 0x800000 above the chip's."""
+    """Name -> (address, size) of every named symbol; data addresses are offset by 0x800000 from the chip's."""
     image = path.read_bytes()
     if image[:4] != b"\x7fELF" or image[4:6] != b"\x01\x01":
         raise ValueError(f"{path} is not a 32-bit little-endian ELF file")

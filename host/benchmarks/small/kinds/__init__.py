@@ -1,4 +1,4 @@
-"""The kinds, one a file: a model as its owner writes it, and the truth as the literature has it otherwise."""
+"""The kinds, one per file: a model as its owner writes it, and a truth with other formulas from the literature."""
 
 from benchmarks.small.kinds import battery, chemical, drive, electrical, hydraulic, oscillator, thermal
 

@@ -1,7 +1,8 @@
 """A stirred reactor, A to B to C: concentration of A in the feed in, concentration of B out; the flow is measured.
 
-Model: first order both. Sources of the truth's forms: Hill's and Haldane's kinetics; orders of 1.7 and 1.1; a catalyst
-that decays hyperbolically; autocatalysis that saturates; two mixing volumes in a row; inhibition as an exponential.
+Model: both reactions of first order. Sources of the truth's forms: Hill's and Haldane's kinetics; orders of 1.7 and
+1.1; a catalyst that decays hyperbolically; autocatalysis that saturates; two mixing volumes in a row; inhibition as an
+exponential.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def _rates(t, x, u, p, dx):
         p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8],
     )  # fmt: skip
     a, b, c = max(x[0], 0.0), max(x[1], 0.0), max(x[2], 0.0)
-    dx[3] = (u - x[3]) / max(lag, 2.5)  # a shorter lag than the step can follow fades out instead
+    dx[3] = (u - x[3]) / max(lag, 2.5)  # a lag too short for the step fades out instead
     fed = u + min(lag, 2.5) / 2.5 * (x[3] - u)
     forward = first * np.exp(-decay * t) * a / (1.0 + affinity * a) / (1.0 + inhibition * c)
     forward += autocatalysis * a * b - reverse * b
@@ -60,7 +61,7 @@ def _true_rates(t, x, u, p, dx):
         p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9],
     )  # fmt: skip
     a, b, c, fed = max(x[0], 0.0), max(x[1], 0.0), max(x[2], 0.0), u
-    for k in range(2):  # x[3], x[4]: what the feed passes through
+    for k in range(2):  # x[3], x[4]: volumes that the feed passes through
         dx[3 + k] = 2.0 * (fed - x[3 + k]) / volumes if volumes > 0.0 else 0.0
         fed = x[3 + k] if volumes > 0.0 else fed
     forward = first / (1.0 + ages * t) * a * np.exp(-poison * c)

@@ -2,8 +2,8 @@
 
 Model: two inertias, a damped spring between them, damping at the load. Sources of the truth's forms: Dahl's bristles
 (1968); drag with an exponent of 1.75; a gap whose flanks are soft and damped; cogging with a second harmonic; an
-unbalance with one as well; an amplifier with a rounded limit, and of second order; friction that differs in its viscous
-part, too.
+unbalance with one as well; an amplifier with a rounded limit, and of second order; friction whose viscous part depends
+on the direction, too.
 """
 
 from __future__ import annotations

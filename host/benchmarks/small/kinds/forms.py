@@ -8,7 +8,7 @@ from numba import njit
 
 @njit(nogil=True, cache=True)
 def rounded_limit(value, limit):
-    """Saturation with a rounded corner, after a power of twenty."""
+    """Saturation with a corner rounded by a power of twenty."""
     return value if np.isinf(limit) else value / (1.0 + (value / limit) ** 20) ** (1.0 / 20.0)
 
 
@@ -23,5 +23,5 @@ def rounded_dead_zone(value, width, corner):
 
 @njit(nogil=True, cache=True)
 def dahl(speed, deflection_force, force, travel):
-    """The rate of a bristle's force after Dahl: it reaches `force` within some `travel`."""
+    """Rate of a bristle's force by Dahl's model, which approaches `force` within about `travel`."""
     return force / travel * (speed - np.abs(speed) * deflection_force / force) if force > 0.0 else 0.0

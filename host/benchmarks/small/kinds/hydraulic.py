@@ -1,4 +1,4 @@
-"""Two tanks above one another and a pump: its voltage in, the lower tank's level out, in decimeters.
+"""Two cascaded tanks and a pump: its voltage in, the lower tank's level out, in decimeters.
 
 Model: x1' = k u - a1 sqrt(x1), x2' = a1 sqrt(x1) - a2 sqrt(x2). Sources of the truth's forms: a weir's overflow grows
 with the 1.5th power; a porous bottom leaks with a power of 0.85; dead zones and limits of pumps have rounded corners; a
@@ -37,7 +37,7 @@ def _rates(t, x, u, p, dx):
     )  # fmt: skip
     x1, x2 = max(x[0], 0.0), max(x[1], 0.0)
     given = min(max(u - dead, 0.0), limit)
-    dx[2] = (given - x[2]) / max(lag, 1.0)  # a shorter lag than the step can follow fades out instead
+    dx[2] = (given - x[2]) / max(lag, 1.0)  # a lag too short for the step fades out instead
     pumped = pump * (given + min(lag, 1.0) * (x[2] - given))
     through = upper * np.sqrt(x1)
     dx[0] = (1.0 - bypass) * pumped - through - leak * x1 - 0.4 * max(x1 - brim, 0.0)

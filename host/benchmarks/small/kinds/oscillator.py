@@ -76,7 +76,7 @@ def _true_rates(t, x, u, p, dx):
     force += hertz * max(y - gap, 0.0) ** 1.5
     force += 0.5 * creep * (y - x[3]) + 0.5 * creep * (y - x[4])
     dx[3], dx[4] = (y - x[3]) / (0.5 * creep_s), (y - x[4]) / (2.0 * creep_s)
-    for k in range(_SLIPS):  # x[8] and on: elements that slip one after the other
+    for k in range(_SLIPS):  # x[8] onwards: elements that slip one after the other
         most = slips * 2.0 * (k + 1) / (_SLIPS + 1)
         force += slip / _SLIPS * x[8 + k]
         held = x[8 + k] / most

@@ -1,4 +1,4 @@
-"""The kinds whose models are sums of terms of what is measured, for sparse regression."""
+"""The kinds whose models are sums of terms of measured quantities, for sparse regression."""
 
 from __future__ import annotations
 

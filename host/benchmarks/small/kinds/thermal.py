@@ -1,4 +1,4 @@
-"""A heated block: one temperature above the room's, heater power in.
+"""A heated block: heater power in, its temperature above the room's out.
 
 Model: C T' = P - G T. Sources of the truth's forms: Stefan and Boltzmann's law; natural convection with an exponent of
 4/3 (Churchill and Chu, 1975); a heater at constant voltage; the enthalpy method; a thermistor's exponential; a wall as
@@ -60,7 +60,7 @@ def _true_rates(t, x, u, p, dx):
         p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[9], p[10], p[11],
     )  # fmt: skip
     temperature, supplied = x[0], u
-    for k in range(3):  # x[1] to x[3]: what is under way from the heater
+    for k in range(3):  # x[1] to x[3]: power in transit from the heater
         dx[1 + k] = 3.0 * (supplied - x[1 + k]) / dispersion if dispersion > 0.0 else 0.0
         supplied = x[1 + k] if dispersion > 0.0 else supplied
     power = rounded_limit(supplied, limit) / (1.0 + ptc * temperature)

@@ -1,1 +1,1 @@
-"""What people use, one way a file, each with `solve(problem) -> RivalAnswer`."""
+"""Methods that people use, one per file, each with `solve(problem) -> RivalAnswer`."""

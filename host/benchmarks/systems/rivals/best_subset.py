@@ -30,7 +30,7 @@ def fit(problem: KnownProblem, effects: Sequence[str] = (), starts: int = STARTS
 
     def residual(x: np.ndarray) -> np.ndarray:
         found = problem.residual(dict(zip(names, x * scale, strict=True)), problem.fitted)
-        return np.nan_to_num(found, nan=1e6, posinf=1e6, neginf=-1e6)  # there is no simulation so far out
+        return np.nan_to_num(found, nan=1e6, posinf=1e6, neginf=-1e6)  # the simulation may fail far from the optimum
 
     draw = np.random.default_rng(0)
     tried = []
@@ -44,6 +44,6 @@ def fit(problem: KnownProblem, effects: Sequence[str] = (), starts: int = STARTS
 
 
 def bic(problem: KnownProblem, found: Mapping[str, float]) -> float:
-    """n ln(RSS / n) + k ln n, of all samples fitted and as many parameters as `found` has."""
+    """n ln(RSS / n) + k ln n, with n samples fitted and k the number of parameters in `found`."""
     residual = problem.residual(found, problem.fitted)
     return float(len(residual) * np.log(np.mean(residual**2)) + len(found) * np.log(len(residual)))

@@ -1,4 +1,4 @@
-"""lacuna, as its documentation has it."""
+"""lacuna, used as its documentation shows."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from benchmarks.systems.problem import KnownProblem, RivalAnswer
 
 
 def solve(problem: KnownProblem) -> RivalAnswer:
-    """Default settings; the engine makes its own split of what is fitted."""
+    """Diagnose with default settings; the engine splits the records itself."""
     system = lacuna.System(
         problem.simulate, problem.parameters, problem.effects, nuisances=problem.nuisances, outputs=problem.output
     )

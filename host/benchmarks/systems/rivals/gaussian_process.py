@@ -1,4 +1,4 @@
-"""The model as it is, and a Gaussian process on what it leaves: a better prediction, and no name."""
+"""The base model plus a Gaussian process on its residual: a better prediction, but no mechanism named."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from benchmarks.systems.problem import KnownProblem, RivalAnswer
 from benchmarks.systems.rivals.best_subset import STARTS, fit
 from lacuna import Record
 
-POINTS = 600  # of all samples fitted: what a process of this kind can take
+POINTS = 600  # of all samples fitted: as many as such a process can handle
 
 
 def solve(problem: KnownProblem, points: int = POINTS, starts: int = STARTS) -> RivalAnswer:
-    """The process learns the residual of the free run, and is given nothing that was measured when it predicts."""
+    """The process learns the residual of the free run, and gets no measurements when it predicts."""
     base = fit(problem, starts=starts)
 
     def features(record: Record) -> np.ndarray:
@@ -31,13 +31,13 @@ def solve(problem: KnownProblem, points: int = POINTS, starts: int = STARTS) -> 
     kernel = RBF(np.ones(known.shape[1]), (1e-2, 1e3)) + WhiteKernel(0.1)
     process = make_pipeline(StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True, random_state=0))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: that feature does not matter
+        warnings.simplefilter("ignore", ConvergenceWarning)  # a length scale at its bound: that feature is irrelevant
         process.fit(known[chosen], left[chosen])
     return RivalAnswer(None, lambda record: problem.predict(record, base) + process.predict(features(record)))
 
 
 def _features(problem: KnownProblem, record: Record, predicted: np.ndarray) -> np.ndarray:
-    """What the engine takes a residual to depend on as well, shape (n, features): the predicted output, its rate, the
+    """The features that the engine also uses for a residual, shape (n, features): the predicted output, its rate, the
     inputs, and time."""
     rate = np.gradient(predicted, record.time_s)
     inputs = [np.asarray(c) for c in record.inputs.values() if np.shape(c) == record.time_s.shape]

@@ -1,6 +1,6 @@
 """Gaits for the nominal robot that ship with the package: made by `bifa gaits --make`, never by hand.
 
-To read them takes nothing that is slow to import; how they are found stands in `scenarios`.
+Reading them imports nothing slow; the searches that find them are in `scenarios`.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ NAMES = ("fast", "robust", "obstacle", "vertical", "backward", "quiet")
 
 
 class LibraryError(BifaError):
-    """A gait that the library does not have; the text lists those it has."""
+    """The library has no such gait; the message lists those it has."""
 
 
 @dataclass(frozen=True)
 class LibraryGait:
-    """A gait of the library, what it is for, and what was predicted for it when it was made."""
+    """A gait of the library, its purpose, and the predictions made when it was found."""
 
     name: str
     purpose: str
@@ -30,14 +30,14 @@ class LibraryGait:
 
 
 def checked(name: str) -> str:
-    """`name`, if the library has it; else LibraryError."""
+    """Return `name`. Raises LibraryError if the library has no such gait."""
     if name not in NAMES:
         raise LibraryError(f"there is no gait {name!r}; the library has {', '.join(NAMES)}")
     return name
 
 
 def load(name: str) -> LibraryGait:
-    """The gait for a scenario; LibraryError for an unknown one."""
+    """Load the gait of a scenario. Raises LibraryError for an unknown one."""
     path = FOLDER / f"{checked(name)}.toml"
     notes = parse_toml(path.read_text("utf-8"))["provenance"]
     return LibraryGait(name, notes["purpose"], load_gait(path), notes)

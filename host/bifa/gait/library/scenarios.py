@@ -1,4 +1,4 @@
-"""The scenarios of the library: what each gait is for, and the search that finds it."""
+"""Scenarios of the library: the purpose of each gait and the settings of the search that finds it."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +13,7 @@ from bifa.robot.gait import save_gait
 
 @dataclass(frozen=True)
 class Scenario:
-    """What a gait is for, and the search that finds it."""
+    """Purpose of a gait and the settings of its search."""
 
     name: str
     purpose: str
@@ -49,12 +49,12 @@ assert tuple(SCENARIOS) == NAMES
 
 
 def load_scenario(name: str) -> Scenario:
-    """The scenario of a name; LibraryError for an unknown one."""
+    """Return the scenario called `name`. Raises LibraryError for an unknown one."""
     return SCENARIOS[checked(name)]
 
 
 def provenance(optimum: Optimum, model_name: str, made_by: str) -> dict[str, Any]:
-    """What a gait file says of its origin: model, search, predicted speeds."""
+    """Provenance table of a gait file: model, search, predicted speeds."""
     settings = optimum.settings
     return {
         "made_by": made_by,

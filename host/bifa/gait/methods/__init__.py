@@ -1,4 +1,4 @@
-"""Optimisers from well-kept libraries behind one call: maximise a batched objective over the unit cube."""
+"""Optimisers from established libraries behind one call: maximise a batched objective over the unit cube."""
 
 from .bayesian import bayesian_optimization
 from .cma_es import cma_es

@@ -7,12 +7,12 @@ import numpy as np
 from .common import Evaluated, Objective, OnEvaluated, RecordedObjective
 
 KAPPA = 0.5  # the paper's, favouring exploitation
-_INITIAL_SHARE, _INITIAL_LEAST = 0.1, 10  # of the evaluations, spread at random before the process is asked
-# Speeds end at cliffs. A process free to choose takes a cliff for noise: its length falls to 1e-5, and it searches
-# at random.
-_LENGTHS = (0.1, 3.0)  # of the unit cube
-_REFIT = 10  # evaluations from one fit of the length to the next
-_RANDOM, _CLIMBS = 3000, 2  # points at which the bound is looked at, and how many of the best it is climbed from
+_INITIAL_SHARE, _INITIAL_LEAST = 0.1, 10  # of the evaluations, at random points before the process takes over
+# Speeds drop at cliffs. With a free length scale the process takes a cliff for noise: the scale falls to 1e-5, and the
+# search becomes random.
+_LENGTHS = (0.1, 3.0)  # bounds of the length scale, in the unit cube
+_REFIT = 10  # evaluations between fits of the length scale
+_RANDOM, _CLIMBS = 3000, 2  # points at which the bound is evaluated, and how many of the best are refined
 
 
 def bayesian_optimization(
@@ -24,8 +24,8 @@ def bayesian_optimization(
 ) -> Evaluated:
     """Maximise `objective` with `evaluations` calls, one at a time; `wraps` (dimensions,) marks full turns.
 
-    The cost is the Gaussian process's own: a tenth of a second a suggestion at first, and more with each.
-    The process knows nothing of full turns, as in the paper.
+    Most of the time goes into the Gaussian process: a tenth of a second per suggestion at first, and growing.
+    As in the paper, the process does not know that axes wrap.
     """
     from bayes_opt import TargetSpace
     from bayes_opt.acquisition import UpperConfidenceBound
@@ -39,9 +39,9 @@ def bayesian_optimization(
     process = GaussianProcessRegressor(Matern(0.3, _LENGTHS, nu=2.5), alpha=1e-6, normalize_y=True)
     random = np.random.RandomState(seed)
     initial = max(_INITIAL_LEAST, round(_INITIAL_SHARE * evaluations))
-    # The matrices are small: threads of the linear algebra library only get into each other's way.
+    # The matrices are small: several threads in the linear algebra library only slow it down.
     with warnings.catch_warnings(), threadpool_limits(1):
-        # A length at its bound is usual where most of the cube has speed 0.
+        # scikit-learn warns of a length scale at its bound, which is usual when most of the cube has speed 0.
         warnings.simplefilter("ignore")
         for point in np.random.default_rng([seed, 3]).random((min(initial, evaluations), len(wraps))):
             space.register(point, float(recorder(point[None])[0]))

@@ -1,4 +1,4 @@
-"""CMA-ES (Hansen), the package `cma`, from several basins of a space-filling sample, until the best two runs agree."""
+"""CMA-ES (Hansen; package `cma`) from several basins of a space-filling sample, until the best two runs agree."""
 
 from collections.abc import Sequence
 
@@ -11,17 +11,17 @@ from bifa.gait.space import folded
 
 from .common import Evaluated, Objective, OnEvaluated, RecordedObjective, agree
 
-_SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, which is doubled until enough of them walk
+_SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, doubled until enough walk
 _ENOUGH = 60
-APART = 0.12  # of two starts, on some axis of the unit cube: another basin
+APART = 0.12  # distance on some axis of the unit cube that puts two starts in different basins
 _NEIGHBORS, _COMPARED = 8, 2000
-POPULATION = 12  # of a run, in a generation
-_CLIMBS = 5  # at once, and as many in each restart
-_STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations, of the unit cube: of any basin, and near its top
-_TRIAL = 10  # generations after which a run far behind the best is given up
-_BEHIND = 0.9  # of the best value: what is below is far behind
-_SAME = 2.5e-3  # two runs that end within this part of each other are enough
-_STALLED, _GAIN = 10, 5e-4  # generations in which a run has gained less than this part ends it
+POPULATION = 12  # points per run and generation
+_CLIMBS = 5  # runs side by side, at first and in each restart
+_STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations in the unit cube: in any basin, and near its top
+_TRIAL = 10  # generations after which a run far behind the best is abandoned
+_BEHIND = 0.9  # share of the best value below which a run is far behind
+_SAME = 2.5e-3  # relative difference within which the best two runs agree
+_STALLED, _GAIN = 10, 5e-4  # a run ends if it gains less than this fraction in so many generations
 
 
 def cma_es(
@@ -31,8 +31,8 @@ def cma_es(
     seed: int,
     on_progress: OnEvaluated | None = None,
 ) -> Evaluated:
-    """Maximise `objective` in at most about `evaluations` calls, fewer where the landscape is simple; `wraps`
-    (dimensions,) marks full turns."""
+    """Maximise `objective` with at most about `evaluations` evaluations, fewer if the landscape is simple; `wraps`
+    (dimensions,) marks axes that are full turns."""
     recorder = RecordedObjective(objective, wraps, on_progress)
     _sample(recorder, len(wraps), seed, evaluations)
     return climb_basins(recorder, wraps, evaluations, seed)
@@ -47,9 +47,9 @@ def climb_basins(
     known: Sequence[np.ndarray] = (),
     behind: float = _BEHIND,
 ) -> Evaluated:
-    """Runs of CMA-ES from points `known` to be near tops and from the best basins among what was recorded, until the
-    best two agree, all basins were tried, or about `evaluations` are recorded. Near known tops all runs go to their
-    ends: two that agree early may be in one basin, and another ahead of both in the end."""
+    """Run CMA-ES from points `known` to be near local optima and from the best recorded basins, until the best two runs
+    agree, all basins were tried, or about `evaluations` are recorded. With `known` points every run is completed: two
+    that agree early may be in one basin, and another may overtake both."""
     same = 0.0 if len(known) else _SAME
     ends, tried = Evaluated(np.empty((0, len(wraps))), np.empty(0)), list(known)
     while recorder.count < evaluations and not agree(ends.values, _SAME):
@@ -65,7 +65,7 @@ def climb_basins(
 
 
 def _sample(recorder: RecordedObjective, dimensions: int, seed: int, evaluations: int) -> None:
-    """Sobol points, until enough of them walk, or half of `evaluations` is spent."""
+    """Evaluate Sobol points until enough of them walk or half of `evaluations` is spent."""
     sobol = qmc.Sobol(dimensions, rng=np.random.default_rng([seed, 2]))
     size = min(_SAMPLE, 1 << max(3, int(np.log2(max(evaluations, 16) / 2))))
     values = recorder(sobol.random(size))
@@ -74,8 +74,8 @@ def _sample(recorder: RecordedObjective, dimensions: int, seed: int, evaluations
 
 
 def basins(seen: Evaluated, wraps: np.ndarray, count: int, tried: Sequence[np.ndarray] = ()) -> np.ndarray:
-    """The best points that no other near them beats, each the top of a basin as far as was seen, and that are in none
-    of the basins tried; then the best of the others. At most `count`, (m, dimensions)."""
+    """Up to `count` starting points (m, dimensions) outside the basins `tried`: first the best of the points that no
+    neighbour beats, each the top of its basin as far as known, then the best of the others."""
     tops = _tops(seen, wraps)
     first = Evaluated(seen.points[tops], seen.values[tops]).finalists(count, APART, wraps, avoid=tried)
     if len(first) >= count:
@@ -84,12 +84,12 @@ def basins(seen: Evaluated, wraps: np.ndarray, count: int, tried: Sequence[np.nd
 
 
 def _tops(seen: Evaluated, wraps: np.ndarray) -> np.ndarray:
-    """Indices of the points that are better than their nearest `_NEIGHBORS`, among the best `_COMPARED`."""
+    """Indices of those of the best `_COMPARED` points that are better than their nearest `_NEIGHBORS`."""
     order = np.argsort(-seen.values, kind="stable")[:_COMPARED]
     order = order[seen.values[order] > 0.0]
     if len(order) <= _NEIGHBORS:
         return order
-    # Full turns as circles: where axes wrap, a chord does for the distance.
+    # Axes that wrap are mapped to circles, with the chord as distance.
     turn = 2.0 * np.pi * seen.points[order][:, wraps]
     places = np.hstack([seen.points[order][:, ~wraps], np.cos(turn) / np.pi, np.sin(turn) / np.pi])
     near = cKDTree(places).query(places, _NEIGHBORS + 1)[1]
@@ -105,12 +105,12 @@ def climb_together(
     behind: float = _BEHIND,
     same: float = 0.0,
 ) -> Evaluated:
-    """Runs of CMA-ES from `starts` (n, dimensions), a generation of all of them in one call; the best of each.
-    One that after a while is below `behind` of the best is given up; all are, where two that ended agree within `same`,
-    if that is not 0, and nothing that runs is ahead."""
+    """Run CMA-ES from `starts` (n, dimensions), one generation of all runs per call; return the best point of each.
+    A run that after `_TRIAL` generations is below `behind` of the best is abandoned. If `same` is not 0, all runs stop
+    once two that have ended agree within it and no running one is ahead."""
     tops = np.array(starts, dtype=float)
     runs = [_strategy(*start, seed + k) for k, start in enumerate(zip(starts, steps, strict=True))]
-    bests: list[list[float]] = [[] for _ in runs]  # of each, so far, after every generation
+    bests: list[list[float]] = [[] for _ in runs]  # best value so far of each run, after every generation
     alive, spent = list(range(len(runs))), 0
     while alive and spent < evaluations:
         asked = [np.array(runs[k].ask()) for k in alive]
@@ -140,6 +140,6 @@ def _has_stalled(bests: Sequence[float]) -> bool:
 
 
 def _strategy(start: np.ndarray, step: float, seed: int) -> cma.CMAEvolutionStrategy:
-    # The recorder folds points into the cube, so the search itself needs no bounds; seed 0 means "by the clock" to cma.
+    # The recorder folds points into the cube, so CMA-ES itself needs no bounds. To cma seed 0 means "from the clock".
     options = {"seed": seed + 1, "popsize": POPULATION, "verbose": -9, "tolfun": 1e-3, "tolx": 1e-4}
     return cma.CMAEvolutionStrategy(np.asarray(start), step, options)

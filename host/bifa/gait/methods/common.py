@@ -1,4 +1,4 @@
-"""What every optimiser takes and gives."""
+"""Common interface of the optimisers."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ Objective = Callable[[np.ndarray], np.ndarray]
 # (evaluations so far, best value so far) -> None
 OnEvaluated = Callable[[int, float], None]
 
-AGREE = 0.01  # relative, of what the best two of independent runs end at
+AGREE = 0.01  # relative difference within which the best two of independent runs agree
 
 
 @dataclass(frozen=True)
 class Evaluated:
     """Everything that was evaluated: `points` (n, dimensions), folded into the cube, and `values` (n,).
 
-    ends: what independent runs ended at, the best first, of a method that has several.
+    ends: end points of independent runs, the best first; None for a method with a single run.
     """
 
     points: np.ndarray
@@ -28,12 +28,12 @@ class Evaluated:
 
     @property
     def agrees(self) -> bool:
-        """Whether the best two of the independent runs have come to the same value; true of a method that has none."""
+        """Whether the best two independent runs ended at the same value; True for a method with a single run."""
         return self.ends is None or agree(self.ends.values)
 
     @property
     def best_point(self) -> np.ndarray:
-        """(dimensions,) where the value is highest."""
+        """Point (dimensions,) with the highest value."""
         return self.points[int(np.argmax(self.values))]
 
     @property
@@ -42,19 +42,19 @@ class Evaluated:
         return float(self.values.max())
 
     def joined(self, *others: "Evaluated") -> "Evaluated":
-        """Both, of one objective."""
+        """Return all evaluations together; they must be of the same objective."""
         parts = (self, *others)
         points, values = (np.concatenate([getattr(part, name) for part in parts]) for name in ("points", "values"))
         return Evaluated(points, values, self.ends)
 
     @property
     def ranked(self) -> "Evaluated":
-        """The same, the best first."""
+        """The same evaluations, the best first."""
         order = np.argsort(-self.values, kind="stable")
         return Evaluated(self.points[order], self.values[order], self.ends)
 
     def near_best(self, share: float) -> "Evaluated":
-        """What comes to `share` of the best value; nothing where that is 0."""
+        """Return the evaluations that reach `share` of the best value; none if that is 0."""
         near = (self.values > 0.0) & (self.values >= share * self.values.max(initial=0.0))
         return Evaluated(self.points[near], self.values[near])
 
@@ -65,8 +65,8 @@ class Evaluated:
         wraps: np.ndarray | None = None,
         avoid: Sequence[np.ndarray] = (),
     ) -> np.ndarray:
-        """(m, dimensions) of the best points, m <= count, no two closer than `apart` on every axis, nor so close to one
-        of `avoid`; wraps: axes that are full turns."""
+        """Return the best points (m, dimensions), m <= count, each at least `apart` on some axis from all others and
+        from those of `avoid`; wraps: axes that are full turns."""
         turns = np.zeros(self.points.shape[1], dtype=bool) if wraps is None else wraps
         free = np.ones(len(self.points), dtype=bool)
         for point in avoid:
@@ -83,19 +83,19 @@ class Evaluated:
 
 
 def _distances(points: np.ndarray, point: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """The greatest difference on any axis, the shorter way round on full turns."""
+    """Greatest difference along any axis, the shorter way round on full turns."""
     difference = np.abs(points - point)
     return np.where(turns, np.minimum(difference, 1.0 - difference), difference).max(axis=1)
 
 
 def agree(ends: Iterable[float], within: float = AGREE) -> bool:
-    """Whether the best two of independent runs have come to the same value."""
+    """Whether the best two of independent runs ended at the same value."""
     first, second = [*sorted(ends, reverse=True), 0.0, 0.0][:2]
     return first > 0.0 and second >= (1.0 - within) * first
 
 
 class RecordedObjective:
-    """An objective that remembers what it was asked, folds points and reports progress."""
+    """An objective that folds points into the unit cube, records all evaluations and reports progress."""
 
     def __init__(self, objective: Objective, wraps: np.ndarray, on_progress: OnEvaluated | None = None):
         self._objective, self.wraps, self._on_progress = objective, wraps, on_progress
@@ -116,5 +116,5 @@ class RecordedObjective:
         return values
 
     def found(self, ends: Evaluated | None = None) -> Evaluated:
-        """All of it; `ends` of independent runs."""
+        """Return everything recorded; `ends`: end points of independent runs."""
         return Evaluated(np.concatenate(self._points), np.concatenate(self._values), ends)

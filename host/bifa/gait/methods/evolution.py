@@ -1,4 +1,4 @@
-"""Differential evolution (Storn and Price), SciPy's, one batch a generation."""
+"""Differential evolution (Storn and Price) by SciPy, one batch per generation."""
 
 import numpy as np
 from scipy import optimize
@@ -18,7 +18,7 @@ def differential_evolution(
 ) -> Evaluated:
     """Maximise `objective` with about `evaluations` calls; `wraps` (dimensions,) marks full turns.
 
-    A full turn is searched over one and a half, so that no optimum lies at an end.
+    Axes that wrap are searched over one and a half turns, so that no optimum lies at an end.
     """
     recorder = RecordedObjective(objective, wraps, on_progress)
     bounds = [(-0.25, 1.25) if wrap else (0.0, 1.0) for wrap in wraps]
@@ -32,7 +32,7 @@ def differential_evolution(
         mutation=(0.4, 0.9),
         recombination=0.8,
         tol=0.0,
-        atol=-1.0,  # never "converged" while a whole generation stands still at speed 0
+        atol=-1.0,  # never "converged" while a whole generation has speed 0
         polish=False,
         updating="deferred",
         vectorized=True,

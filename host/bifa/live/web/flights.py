@@ -1,6 +1,6 @@
-"""One flight after another: where somebody watches the page, a robot that is gone is waited for, as `bifa record` does.
+"""Successive flights: while somebody watches the page, wait for a disconnected robot to return, as `bifa record` does.
 
-It never walks by itself when it is back: who watches decides.
+When it is back, it never walks by itself; whoever watches decides.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ def fly(
     first: Callable[[Uno], None],
     later: Callable[[Uno], None],
 ) -> None:
-    """Fly until Ctrl-C or for `duration_s`; `first(uno)` begins the first flight, `later(uno)` each that follows.
+    """Fly until Ctrl-C or for `duration_s`; `first(uno)` begins the first flight, `later(uno)` each later one.
 
-    say: what has gone wrong, for the terminal. Raises what ended a flight where nobody watches the pages.
+    say: prints on the terminal what has gone wrong. Raises the error that ended a flight if nobody watches the pages.
     """
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
     begin, came_back, told = first, "", ""
@@ -42,6 +42,6 @@ def fly(
                 raise
             if str(error) != told:
                 told = str(error)
-                say(f"{error}\nwaiting for the Uno, since a page is open; once back, it stands still (Ctrl-C ends)")
-            begin, came_back = later, "the Uno was gone and is back; it does not walk by itself"
+                say(f"{error}\nwaiting for the Uno, since a page is open; it will not walk by itself (Ctrl-C ends)")
+            begin, came_back = later, "the Uno was disconnected and is back; it does not walk by itself"
             time.sleep(RETRY_S)

@@ -1,7 +1,7 @@
-"""Who may be connected to the live page's server, and for how long: strangers never keep the robot's owner waiting.
+"""Limits on connections to the live page's server, so that strangers never keep the robot's owner waiting.
 
-A connection is a stranger's until it has shown the token. When too many strangers are there, the one that has been
-there longest goes, so that whoever comes is heard: a stop needs no token. All of it runs in the server's loop.
+A connection is a stranger's until it has shown the token. When there are too many strangers, the oldest is cut off, so
+that every newcomer is served: a stop needs no token. All of this runs in the server's event loop.
 """
 
 import asyncio
@@ -12,17 +12,17 @@ from uvicorn.protocols.websockets.wsproto_impl import WSProtocol
 
 MOST_STRANGERS = 32
 HEADERS_WITHIN_S = 5.0
-ANSWERED_WITHIN_S = 20.0  # a request and its answer; a page that only watches stays
+ANSWERED_WITHIN_S = 20.0  # a request and its answer; websockets may stay longer
 LARGEST_HEADERS = 16 * 1024
 LARGEST_MESSAGE = 4 * 1024
-ACCEPTED_AT_ONCE = 4  # connections, before the loop looks at what the others say
+ACCEPTED_AT_ONCE = 4  # connections accepted before the loop serves the others
 
 
 class Gate:
-    """Counts connections; `http` and `websocket` are the protocols that uvicorn is to serve with."""
+    """Tracks strangers' connections; `http` and `websocket` are the protocol classes for uvicorn."""
 
     def __init__(self) -> None:
-        self.strangers: dict[asyncio.Transport, asyncio.TimerHandle] = {}  # the oldest first
+        self.strangers: dict[asyncio.Transport, asyncio.TimerHandle] = {}  # oldest first
 
         class Http(H11Protocol):
             def connection_made(http, transport: Any) -> None:  # noqa: N805
@@ -45,7 +45,7 @@ class Gate:
         self.http, self.websocket = Http, Websocket
 
     def prove(self, client: tuple[str, int]) -> None:
-        """Whoever is connected from `client` has shown the token."""
+        """Record that the connection from `client` has shown the token."""
         for transport in [t for t in self.strangers if t.get_extra_info("peername") == tuple(client)]:
             self._forget(transport)
 

@@ -1,4 +1,4 @@
-"""Who talks to the Uno: one thread, which does what others ask it to; a stop goes out at once, from any thread."""
+"""One thread owns the link to the Uno and carries out others' requests; any thread can send a stop at once."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from bifa.live.rounds import Latest, Pace
 REPORT_S = 0.1
 MOST_ASKED = 16
 MOVING = ("running", "holding")
-_LOOK_S = 0.02  # how long a request may wait for the robot's samples
-_EVERY_NTH = 5  # sample is shown: 20 a second
-_BETWEEN_STOPS_S = 0.02  # so that whoever stops again and again leaves room on the line for the answer
+_LOOK_S = 0.02  # longest time that a request waits for the robot's samples
+_EVERY_NTH = 5  # every fifth sample is shown: 20 a second
+_BETWEEN_STOPS_S = 0.02  # so that repeated stops leave room on the line for the answer
 
 Tell = Callable[[dict[str, Any], list[dict[str, Any]]], None]
 
 
 class NobodyThereError(BifaError):
-    """The robot is not connected, or not any more."""
+    """The robot is not connected, or no longer."""
 
 
 class BusyError(BifaError):
@@ -44,25 +44,25 @@ class Stopper:
         threading.Thread(target=self._run, daemon=True, name="stopper").start()
 
     def stop(self) -> None:
-        """Send one, now; from any thread."""
+        """Send one now; callable from any thread."""
         self._wanted.set()
 
     def end(self) -> None:
-        """No more are sent."""
+        """Send no more."""
         self._ended = True
         self._wanted.set()
 
     def _run(self) -> None:
         while self._wanted.wait() and not self._ended:
             self._wanted.clear()
-            with contextlib.suppress(ConnectionError):  # who talks to the robot finds out as well
+            with contextlib.suppress(ConnectionError):  # the pilot's thread finds out as well
                 self._send()
             time.sleep(_BETWEEN_STOPS_S)
 
 
 @dataclass(frozen=True)
 class _Asked:
-    """What to do, whether that changes what the robot has, and who waits for it."""
+    """A request: what to do, whether that changes the robot's parameters or presets, and the future of its result."""
 
     what: Callable[[Uno], Any]
     changes: bool
@@ -70,12 +70,13 @@ class _Asked:
 
 
 class Pilot:
-    """`fly` runs in the main thread, which signals reach; `ask` and `stop` are for all others. `stopped`: by whom, when
-    and why the robot was stopped, and whether it has confirmed; None: it was not."""
+    """Carries out requests on the Uno. `fly` runs in the main thread, which receives signals; `ask` and `stop` are for
+    all other threads. `stopped`: by whom, when and why the robot was stopped, and whether the Uno has confirmed that;
+    None if it was not stopped."""
 
     def __init__(self) -> None:
         self._asked: deque[_Asked] = deque()
-        self._stop: Future[Any] | None = None  # asked for, and not yet confirmed
+        self._stop: Future[Any] | None = None  # requested, and not yet confirmed
         self._lock = threading.Lock()
         self._stopper: Stopper | None = None
         self._is_flying = False
@@ -84,8 +85,8 @@ class Pilot:
         self.is_watched: Callable[[], bool] = lambda: True  # whether anybody would see that a stop failed
 
     def ask(self, what: Callable[[Uno], Any], changes: bool = False) -> Future[Any]:
-        """Have `what(uno)` called soon; the future has its result, or what it raised. changes: parameters or presets,
-        which are then told."""
+        """Have `what(uno)` called soon; the future gets its result or exception. changes: it changes parameters or
+        presets, which are then read and shown again."""
         future: Future[Any] = Future()
         with self._lock:
             if not self._is_flying:
@@ -97,8 +98,8 @@ class Pilot:
         return future
 
     def stop(self, by: str = "a page") -> Future[Any]:
-        """All valves off, now; whatever was asked before and has not begun is dropped. The result comes when the Uno
-        has said that it is so; StillMovingError if it does not. by: who stops, for everybody to read."""
+        """Turn all valves off now, and cancel requests that have not begun. The future gets its result when the Uno has
+        confirmed the stop, or StillMovingError if it does not. by: who stops, as shown on every page."""
         if stopper := self._stopper:
             stopper.stop()
         with self._lock:
@@ -124,12 +125,12 @@ class Pilot:
         position_mm: Callable[[], dict[str, float]] | None = None,
         came_back: str = "",
     ) -> None:
-        """Connect, `begin(uno)`, and tell what happens until Ctrl-C or for `duration_s`; then the robot stands.
+        """Connect, call `begin(uno)`, and report what happens until Ctrl-C or for `duration_s`; then stop the robot.
 
-        tell(changes, samples): called every REPORT_S with what is so now and the samples since, as plain types.
-        position_mm: where an instrument sees the ends, if it can be read at any moment. came_back: why the robot
-        stands, where it was gone and is back. Raises LinkError or a
-        ConnectionError when the robot is gone, or a stop was not confirmed and nobody watches; and tells that first.
+        tell(changes, samples): called every REPORT_S with the present state and the new samples, as plain types.
+        position_mm: reads the positions of the robot's ends, if an instrument can be read at any moment. came_back: why
+        the robot stands still, if it was disconnected and is back. Raises LinkError or a ConnectionError if the robot
+        is disconnected, or if a stop was not confirmed and nobody watches; calls `tell` first.
         """
         self._stopper = Stopper(uno.send_stop)
         try:
@@ -140,7 +141,7 @@ class Pilot:
                     begin(uno)
                     uno.stream(True)
                     _Flight(self, uno, clock, tell, position_mm).follow(duration_s)
-                except (LinkError, ConnectionError) as error:  # the pages learn of it before the stop is tried
+                except (LinkError, ConnectionError) as error:  # tell the pages before the stop is tried
                     self._gone(error, tell)
                     raise
                 finally:
@@ -152,7 +153,7 @@ class Pilot:
             self._stopper.end()
 
     def _gone(self, error: Exception, tell: Tell) -> None:
-        self._ended = f"the robot is gone: {error}"
+        self._ended = f"the robot is disconnected: {error}"
         tell({"gone": str(error), "robot": "gone"}, [])
 
     def _take_off(self, came_back: str) -> None:
@@ -175,7 +176,7 @@ class Pilot:
     # -- for the flight ---------------------------------------------------------------------------------------
 
     def next_asked(self) -> _Asked | None:
-        """What to do next, None for nothing; a stop that is asked for comes first."""
+        """Return the next request, or None; a requested stop comes first."""
         with self._lock:
             if self._stop is not None:
                 return _Asked(self._stop_now, False, self._stop)
@@ -196,20 +197,20 @@ class Pilot:
                 self.stopped = {**(self.stopped or {}), "is_confirmed": confirmed, "at": wall_clock()}
 
     def stopped_by_itself(self, why: str) -> None:
-        """The robot stopped, and nobody here had asked it to."""
+        """Record that the robot stopped without a request from here."""
         with self._lock:
             if self._stop is None:
                 self.stopped = _by_itself(why)
 
     def moves(self) -> None:
-        """The robot moves: what had stopped it is over."""
+        """Record that the robot moves again after an earlier stop."""
         with self._lock:
             if self._stop is None:
                 self.stopped = None
 
 
 class _Flight:
-    """One flight: looks at the robot, does what is asked, and tells."""
+    """One flight: watches the robot, carries out requests, and reports."""
 
     def __init__(
         self, pilot: Pilot, uno: Uno, clock: Clock, tell: Tell, position_mm: Callable[[], dict[str, float]] | None
@@ -221,7 +222,7 @@ class _Flight:
         self._learnt: dict[str, Any] = {}
 
     def follow(self, duration_s: float | None) -> None:
-        """Until `duration_s` is over, or for ever."""
+        """Run until `duration_s` is over, or for ever."""
         self._learn()
         pace, begun_s = Pace(self._clock), self._clock.now()
         while duration_s is None or self._clock.now() - begun_s < duration_s:
@@ -246,7 +247,7 @@ class _Flight:
             asked.future.set_exception(error)
             if not self._pilot.is_watched():
                 raise
-        except BifaError as error:  # refused: whoever asked is told
+        except BifaError as error:  # refused: the requester gets the error
             asked.future.set_exception(error)
         except BaseException as error:
             asked.future.set_exception(NobodyThereError(str(error) or "bifa monitor has ended"))
@@ -256,16 +257,16 @@ class _Flight:
             asked.future.set_result(answer)
 
     def _tell_now(self) -> None:
-        """What has just been done, before whoever asked is answered."""
+        """Report what was just done, before the request is answered."""
         self._tell({"stopped": self._pilot.stopped, **self._learnt}, [])
 
     def _learn(self) -> None:
-        """What the robot has now, for everybody to see."""
+        """Read the robot's parameters and presets, for every page to show."""
         parameters, is_pending = self._uno.parameters_and_pending()
         self._learnt = {"parameters": parameters, "presets": self._uno.presets(), "is_pending": is_pending}
 
     def _notice(self) -> None:
-        """Why the robot stopped, if it did so by itself; and whether a pending parameter set has been adopted."""
+        """Find out why the robot stopped, if it did so by itself, and whether pending parameters have been adopted."""
         state = self._latest.sample.state if self._latest.sample else ""
         if state != self._state:
             if self._state in MOVING and state not in MOVING and self._pilot.stopped is None:
@@ -322,5 +323,5 @@ def _shown(sample: Sample) -> dict[str, Any]:
 
 
 def wall_clock() -> str:
-    """The time of day, for people: when a stop was confirmed."""
+    """The time of day, to show when a stop was confirmed."""
     return time.strftime("%H:%M:%S")

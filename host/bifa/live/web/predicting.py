@@ -1,4 +1,4 @@
-"""What the page predicts for the gait on its sliders: the model's own speed at once, then the interval."""
+"""Predictions for the gait on the page's sliders: the model's own speed at once, then the interval."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ _REMEMBERED = 32
 
 
 def step_back() -> None:
-    """Let all other threads go first from now on, which on Linux a single thread can do."""
+    """Lower this thread's priority below all others'; only Linux can do so for a single thread."""
     if sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
 
 
 class GaitPrediction:
-    """Predictions of one model, for a thread of its own: it computes without holding up the others."""
+    """Predictions of one model, to be made in a separate thread so as not to hold up the others."""
 
     def __init__(self, model: Model):
         self._model = model
         self.in_full = lru_cache(_REMEMBERED)(self._in_full)
 
     def at_once(self, gait: Gait) -> dict[str, Any]:
-        """The model's own prediction."""
+        """Return the model's own prediction: speed and slip, or an error."""
         try:
             progress = speed(self._model, gait)
         except BifaError as error:
@@ -42,7 +42,7 @@ class GaitPrediction:
         return {"speed_mm_s": round(float(progress.speed_mm_s), 2), "slip_mm": slip_mm}
 
     def _in_full(self, gait: Gait) -> dict[str, Any]:
-        """The same with what is predicted by all that is known of the robot, in words."""
+        """Return the same, and in words the prediction that accounts for all that is known of the robot."""
         found = self.at_once(gait)
         return found if "error" in found else found | {"predicted": self.predictor.of(gait, workers=1).text}
 

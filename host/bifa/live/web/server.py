@@ -1,8 +1,8 @@
-"""The live page's server, on this computer only: anybody here may look and may stop the robot; for all else it takes
-the page's token.
+"""The live page's server, for this computer only: anyone here may watch and may stop the robot; all else requires the
+page's token.
 
-A page says and hears everything over one websocket, so that a stop never waits behind other requests; it has a path of
-its own to the port besides (bifa.live.web.pilot.Stopper).
+A page sends and receives everything over one websocket, so that a stop never waits behind other requests; from there,
+a stop also has a path of its own to the port (bifa.live.web.pilot.Stopper).
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from bifa.robot import Model
 from bifa.robot.gait import GAIT_NAMES, Gait
 
 HOST = "127.0.0.1"
-PROTOCOL = "bifa"  # of the websocket; the token is offered beside it
-_ANSWER_S = 15.0  # a page waits at most so long for the robot
-_BACK_WITHIN_S = 3.0  # a page that is reloaded has not been closed
+PROTOCOL = "bifa"  # subprotocol of the websocket; the token is offered as another
+_ANSWER_S = 15.0  # longest time that a page waits for the robot
+_BACK_WITHIN_S = 3.0  # a page that comes back within this time was reloaded, not closed
 _HANDED_OVER_S = 0.05
-_WAITING = 64  # messages that a slow page may be behind
+_WAITING = 64  # messages by which a slow page may lag
 _PIECE = 64 * 1024
 SHOWN_S = 20.0
 
@@ -57,12 +57,12 @@ class ServerError(BifaError):
 
 
 class AskedWrongError(ServerError):
-    """A request that the page would not send."""
+    """An invalid request, which the page itself would never send."""
 
 
 @dataclass(frozen=True)
 class Address:
-    """Where the page is; the token is behind the #, so that it is in no log."""
+    """Address of the page; the token follows the #, so that it appears in no log."""
 
     port: int
     token: str
@@ -74,7 +74,7 @@ class Address:
 
 @dataclass(eq=False)
 class OpenPage:
-    """A page that is open. `is_owner`: it has shown the token."""
+    """An open page. `is_owner`: it has shown the token."""
 
     number: int
     is_owner: bool
@@ -82,15 +82,15 @@ class OpenPage:
     answers: set[asyncio.Task[None]] = field(default_factory=set)
 
     def tell(self, message: Mapping[str, Any] | str) -> None:
-        """A page that is too slow misses the oldest."""
+        """Queue a message; a page that is too slow misses the oldest."""
         if self.messages.full():
             self.messages.get_nowait()
         self.messages.put_nowait(message if isinstance(message, str) else json.dumps(message))
 
 
 class LiveState:
-    """What every page shows, with a version that grows with every change: `content` is all there is to show, as plain
-    types; `samples` are those of the last SHOWN_S."""
+    """The state that every page shows, with a version that grows with every change. `content`: everything but samples,
+    as plain types; `samples`: those of the last SHOWN_S."""
 
     def __init__(self, **content: Any) -> None:
         self.version = 0
@@ -98,7 +98,7 @@ class LiveState:
         self.samples: deque[dict[str, Any]] = deque()
 
     def change(self, changes: Mapping[str, Any], samples: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
-        """Take over `changes`; the message that tells the pages, with the samples that are new."""
+        """Apply `changes`, and return the message for the pages, with the new samples."""
         self.version += 1
         self.content |= changes
         for sample in samples:
@@ -110,23 +110,23 @@ class LiveState:
         return {"version": self.version, "state": self.content, "samples": list(samples)}
 
     def whole(self) -> dict[str, Any]:
-        """The message for a page that knows nothing yet, or whose samples are void."""
+        """Return the message for a page that has no state yet, or whose samples are void."""
         return {"version": self.version, "state": self.content, "samples": list(self.samples), "whole": True}
 
 
 class LivePage:
-    """The page, the state that it shows to whoever watches, and what they ask of the robot."""
+    """The page, the state that it shows, and the requests that viewers send to the robot."""
 
     def __init__(self, pilot: Pilot, page: str, model: Model) -> None:
-        """page: the HTML document; model: what predicts the speeds."""
+        """page: the HTML document; model: the model that predicts the speeds."""
         self.pilot, self._page, self._model = pilot, page.encode(), GaitPrediction(model)
         self.token = secrets.token_urlsafe(16)
         self.gate = Gate()
         self.pages: set[OpenPage] = set()
         self._numbers = itertools.count(1)
-        self.loop: asyncio.AbstractEventLoop | None = None  # in which the pages are told
+        self.loop: asyncio.AbstractEventLoop | None = None  # the server's, which sends to the pages
         self._predictor = ThreadPoolExecutor(1, "predictor", step_back)
-        self._predictor.submit(lambda: self._model.predictor)  # drawn before anybody asks
+        self._predictor.submit(lambda: self._model.predictor)  # draw its robots before the first request
         self._prediction: asyncio.Task[None] | None = None
         self.state = LiveState(
             robot="connecting",
@@ -139,38 +139,38 @@ class LivePage:
         )
 
     def is_watched(self) -> bool:
-        """Whether a page is open whose owner would see what it shows; from any thread."""
+        """Whether a page that has shown the token is open; callable from any thread."""
         return any(page.is_owner for page in list(self.pages))
 
     def tell(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
-        """Send to every page; from any thread."""
+        """Send to every page; callable from any thread."""
         if self.loop is not None:
             with contextlib.suppress(RuntimeError):  # the server has just ended
                 self.loop.call_soon_threadsafe(self._heard, changes, samples)
 
     def flush(self, timeout_s: float = 1.0) -> None:
-        """Wait until every page has been told everything, or `timeout_s`."""
+        """Wait until every page has been sent everything, at most `timeout_s`."""
         until_s = time.monotonic() + timeout_s
         time.sleep(_HANDED_OVER_S)
         while any(not page.messages.empty() for page in list(self.pages)) and time.monotonic() < until_s:
             time.sleep(_HANDED_OVER_S)
 
     def app(self) -> Starlette:
-        """Its routes."""
+        """Return the application with its routes."""
         return Starlette(
             routes=[
                 Route("/", self._show),
                 Route("/stop", self._stop_by_request, methods=["POST"]),
                 WebSocketRoute("/live", self._live),
             ],
-            # a page elsewhere that has got hold of this address by a name of its own is not answered
+            # refuse pages of other sites that reach this address by a host name of their own (DNS rebinding)
             middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
         )
 
     # -- the state --------------------------------------------------------------------------------------------
 
     def _heard(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
-        """The robot's part of the state."""
+        """Take over the robot's part of the state."""
         self._change(changes, samples)
         if self.state.content["draft"] is None and "parameters" in changes:
             self._draft(_of_gait(changes["parameters"]), by=0)
@@ -181,7 +181,7 @@ class LivePage:
             page.tell(message)
 
     def _draft(self, gait: dict[str, float], by: int) -> str:
-        """The gait on the sliders, which the robot does not have yet, and what the model makes of it: one at a time,
+        """Set the gait on the sliders, which the robot does not have yet, and predict its speed: one gait at a time,
         the newest last."""
         self._change({"draft": {"gait": gait, "by": by}})
         if self._prediction is None or self._prediction.done():
@@ -205,7 +205,7 @@ class LivePage:
             "Content-Security-Policy": "default-src 'self' 'unsafe-inline'; img-src 'self' data:; "
             "frame-ancestors 'none'",
             "Content-Length": str(len(self._page)),
-            "Connection": "close",  # one request each: nobody has a queue of them here
+            "Connection": "close",  # one request per connection: no client can queue several
             "Cache-Control": "no-store",
             "Referrer-Policy": "no-referrer",
         }
@@ -214,7 +214,7 @@ class LivePage:
     async def _live(self, socket: WebSocket) -> None:
         origin = socket.headers.get("origin", "")
         if origin and origin.partition("://")[2] != socket.headers.get("host"):
-            await socket.close(1008)  # a page from elsewhere
+            await socket.close(1008)  # a page of another site
             return
         given = [name for name in socket.scope["subprotocols"] if name != PROTOCOL]
         page = OpenPage(next(self._numbers), any(secrets.compare_digest(one, self.token) for one in given))
@@ -240,7 +240,7 @@ class LivePage:
                 asyncio.get_running_loop().call_later(_BACK_WITHIN_S, self._closed)
 
     def _closed(self) -> None:
-        """The last page is gone, and nobody has come back. A robot that stands is left alone."""
+        """Stop a moving robot if the last page was closed and none has come back. A robot at rest is left alone."""
         moves = self.state.content["robot"] in MOVING
         if moves and self.state.content["stops_when_closed"] and not self.is_watched():
             self.pilot.stop("the last page was closed").add_done_callback(_seen)
@@ -248,7 +248,7 @@ class LivePage:
     # -- asking -----------------------------------------------------------------------------------------------
 
     def _hear(self, page: OpenPage, text: str) -> None:
-        """One request of a page: {"id": 1, "do": "apply", ...}; the answer has the same id."""
+        """Handle one request of a page: {"id": 1, "do": "apply", ...}; the answer has the same id."""
         try:
             asked = json.loads(text)
             number, name = asked["id"], str(asked["do"])
@@ -264,7 +264,7 @@ class LivePage:
     def _do(self, page: OpenPage, number: Any, name: str, asked: Mapping[str, Any]) -> None:
         acts: dict[str, Callable[[], Awaitable[str] | str]] = {
             "run": lambda: _waited(self.pilot.ask(lambda uno: uno.run()), "walking"),
-            "clear": lambda: _waited(self.pilot.ask(lambda uno: uno.clear()), "released: it may walk again"),
+            "clear": lambda: _waited(self.pilot.ask(lambda uno: uno.clear()), "released: the robot may walk again"),
             "apply": lambda: self._upload(_gait(asked)),
             "save": lambda: self._upload(_gait(asked), str(asked.get("preset", ""))),
             "load": lambda: self._load(str(asked.get("preset", ""))),
@@ -314,10 +314,10 @@ class LivePage:
         if not isinstance(stop, bool):
             raise AskedWrongError("stop must be true or false")
         self._change({"stops_when_closed": stop})
-        return f"when the last page closes, the robot {'stops' if stop else 'goes on'}"
+        return f"when the last page closes, the robot {'stops' if stop else 'keeps going'}"
 
     def _stop(self, by: str) -> Awaitable[str]:
-        """Sent when this returns; the answer comes when the Uno has confirmed."""
+        """Send a stop before returning; the answer comes when the Uno has confirmed it."""
         future = self.pilot.stop(by)
 
         async def confirmed() -> str:
@@ -327,14 +327,14 @@ class LivePage:
         return confirmed()
 
     async def _stop_by_request(self, request: Request) -> Response:
-        """A stop is one whatever comes with it, and whoever sends it."""
+        """Stop the robot, whatever the request contains and whoever sends it."""
         status, answer = await _answered(self._stop("a request to /stop"))
         return JSONResponse(answer, status, {"Connection": "close"})
 
 
 async def _in_pieces(content: bytes) -> AsyncIterator[bytes]:
-    """The page in pieces, so that little of it waits for a reader who is slow or never reads, and others get their
-    turn."""
+    """Yield the page in pieces, so that little is buffered for a client that reads slowly or never, and others get
+    their turn."""
     for begin in range(0, len(content), _PIECE):
         yield content[begin : begin + _PIECE]
         await asyncio.sleep(0)
@@ -347,13 +347,14 @@ async def _send(socket: WebSocket, page: OpenPage) -> None:
 
 
 async def _waited(future: Future[Any], said: str) -> str:
-    """What is said once it is done; if it has not begun in time, it is not done later without the page's knowing."""
+    """Return `said` once the request is done. A request that has not begun in time is cancelled, so that it is not
+    carried out later without the page's knowledge."""
     await asyncio.wait_for(asyncio.wrap_future(future), _ANSWER_S)
     return said
 
 
 def _seen(future: Future[Any]) -> None:
-    """Nobody waits for it; the pilot says what went wrong."""
+    """Retrieve the exception of a future that nobody awaits; the pilot reports what went wrong."""
     if not future.cancelled():
         future.exception()
 
@@ -366,12 +367,12 @@ def _gait(asked: Mapping[str, Any]) -> Gait:
 
 
 def _of_gait(parameters: Mapping[str, float]) -> dict[str, float]:
-    """A gait's values, as the sliders show them."""
+    """Return a gait's values, rounded as the sliders show them."""
     return {name: round(parameters[name], 4) for name in GAIT_NAMES}
 
 
 async def _answered(said: Awaitable[str]) -> tuple[int, dict[str, Any]]:
-    """What came of it, with its HTTP status."""
+    """Return the HTTP status and the content of the answer to a request."""
     try:
         return 200, {"said": await said}
     except AskedWrongError as error:
@@ -387,8 +388,8 @@ async def _answered(said: Awaitable[str]) -> tuple[int, dict[str, Any]]:
 
 
 def _warm_up(port: int) -> None:
-    """What the first request imports, and what a full collection of garbage goes through, would keep a stop waiting for
-    a tenth of a second."""
+    """Make the first request and a full garbage collection now; later, the imports of the one and the duration of the
+    other would delay a stop by a tenth of a second."""
     with contextlib.suppress(OSError, http.client.HTTPException):
         connection = http.client.HTTPConnection(HOST, port, timeout=10)
         connection.request("GET", "/")
@@ -400,12 +401,12 @@ def _warm_up(port: int) -> None:
 
 @contextmanager
 def served(live: LivePage, port: int = 0) -> Iterator[Address]:
-    """Serve the page in a thread of its own while the block runs; port 0: any that is free."""
+    """Serve the page in a thread of its own while the block runs; port 0 takes any free port."""
     listener = socket.socket()
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((HOST, port))
-        listener.listen()  # who comes before the server is up waits
+        listener.listen()  # clients that connect before the server is up wait
     except OSError as error:
         raise ServerError(
             f"port {port} of this computer cannot be opened ({error}); choose another with --web-port"
@@ -415,10 +416,10 @@ def served(live: LivePage, port: int = 0) -> Iterator[Address]:
         http=live.gate.http,
         ws=live.gate.websocket,
         ws_max_size=LARGEST_MESSAGE,
-        ws_per_message_deflate=False,  # a few bytes would become megabytes
+        ws_per_message_deflate=False,  # a few compressed bytes could become megabytes
         h11_max_incomplete_event_size=LARGEST_HEADERS,
         timeout_keep_alive=2,
-        proxy_headers=False,  # who is connected from where is what the socket says
+        proxy_headers=False,  # take the client's address from the socket, not from headers
         backlog=ACCEPTED_AT_ONCE,
         log_level="error",
         lifespan="off",
@@ -439,7 +440,7 @@ def served(live: LivePage, port: int = 0) -> Iterator[Address]:
     try:
         address = Address(listener.getsockname()[1], live.token)
         _warm_up(address.port)
-        listener.listen()  # the server has set its own backlog, which is how many it accepts at once
+        listener.listen()  # undo the server's small backlog, which also limits how many it accepts at once
         yield address
     finally:
         live.flush()

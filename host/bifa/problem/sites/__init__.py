@@ -1,5 +1,5 @@
-"""Where a learnt curve may be added to the robot: in the equations, from trial to trial, in what instruments say. A new
-site is an entry in one of the tables."""
+"""Sites where a learnt curve may be added: the robot's equations, quantities that differ between trials, and the
+instruments. To add a site, add an entry to one of the tables."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SITES = {
 
 
 def declared(model: Model, curves: Mapping[str, FittedCurve]) -> dict[str, CorrectionSite]:
-    """The sites of a model; those over a spring's range have that of its fitted curve, if there is one."""
+    """The sites of a model. Sites over a spring's range use that of its fitted curve, if there is one."""
     springs = {"body": model.body_stiffness, "small": model.small_stiffness}
     fitted = {prefix: curves[prefix].fit if prefix in curves else spring for prefix, spring in springs.items()}
     ranges = {prefix: Range("displacement (m)", spring.lower_m, spring.upper_m) for prefix, spring in fitted.items()}
@@ -29,7 +29,7 @@ def declared(model: Model, curves: Mapping[str, FittedCurve]) -> dict[str, Corre
 
 
 def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session: float = 0.0) -> Plant:
-    """The plant with the learnt curves in it. place_in_session: 0 for the day's first trial, 1 for its last."""
+    """The plant with the learnt curves applied. place_in_session: 0 for the day's first trial, 1 for its last."""
     for correction in corrections:
         site = SITES[correction.site]
         if site.equation:
@@ -42,7 +42,7 @@ def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session:
 def corrected_inputs(
     inputs: Inputs, corrections: Sequence[Correction], plant: Plant, place_in_session: float = 0.0
 ) -> Inputs:
-    """What was done to the robot, as it reached it: valves that switch late, a pipe that grips otherwise."""
+    """The inputs that reach the robot with the learnt curves applied: late valves, different grip of the pipe."""
     for correction in corrections:
         if act := SITES[correction.site].inputs:
             inputs = act(inputs, _curve(plant, correction), place_in_session)
@@ -50,7 +50,7 @@ def corrected_inputs(
 
 
 def corrected_readings(channels: Channels, corrections: Sequence[Correction], inputs: Inputs, plant: Plant) -> Channels:
-    """The channels with what the instruments add to them."""
+    """The channels with the learnt curves of the instruments applied."""
     for correction in corrections:
         if act := SITES[correction.site].readings:
             channels = channels | act(channels, _curve(plant, correction), inputs, plant)
@@ -58,8 +58,8 @@ def corrected_readings(channels: Channels, corrections: Sequence[Correction], in
 
 
 def learnt_curves(plant: Plant, corrections: Sequence[Correction]) -> dict[str, LearntCurve]:
-    """Those of the corrections that are in the robot's equations, as a model has them; what is in the instruments or
-    passes with the day is none of the robot's."""
+    """Curves of the corrections in the robot's own equations, as a model holds them. Corrections of the instruments,
+    and those that change over the day, are not part of the robot."""
     return {c.site: _curve(plant, c) for c in corrections if SITES[c.site].equation}
 
 

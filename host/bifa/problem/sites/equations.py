@@ -1,4 +1,4 @@
-"""Curves in the robot's own equations: the integrator has them (`bifa.robot.learnt.ROWS`)."""
+"""Sites in the robot's own equations, whose curves the integrator applies (`bifa.robot.learnt.ROWS`)."""
 
 from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.problem.sites.site import PLACE, PRESSURE, SPEED, VELOCITY, Range, Site

@@ -1,4 +1,4 @@
-"""What instruments add to what they measure: readings by value, by place, by what came before."""
+"""Sites in the instruments: errors of readings over the value, the position, or the history."""
 
 from functools import partial
 
@@ -29,7 +29,7 @@ def _camera_memory(channels: Channels, curve: LearntCurve, inputs: Inputs, plant
 
 
 def _loading(actuator: str, channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
-    """The force of a static loading of `actuator` with what a curve adds by direction, extending first."""
+    """The force of a static loading of `actuator`, plus a curve for extending (row 0) or contracting (row 1)."""
     if not isinstance(inputs, StaticInputs) or inputs.actuator != actuator:
         return {}
     extending, contracting = (curve.at(inputs.displacement_m, row) for row in (0, 1))
@@ -44,11 +44,11 @@ def _pressure_sensor_inflow(channels: Channels, curve: LearntCurve, inputs: Inpu
     if not isinstance(inputs, (StepInputs, WalkInputs)):
         return {}
     vacuum_psi = plant.q[layout.SUPPLY_NEGATIVE]
-    if isinstance(inputs, WalkInputs):  # begins vented,
+    if isinstance(inputs, WalkInputs):  # a walk starts vented
         positive_psi, rest_psi = plant.q[layout.SUPPLY_POSITIVE], 0.0
-    else:  # a step response under vacuum
+    else:  # a step response starts under vacuum
         positive_psi, rest_psi = inputs.pressure_psi, vacuum_psi
-    before = inputs.commands.at(inputs.time_s - _JUST_S)  # a sample at a switch does not see it yet
+    before = inputs.commands.at(inputs.time_s - _JUST_S)  # a sample at the time of a switch precedes it
     let_in = np.array([vacuum_psi, positive_psi, rest_psi])[before]
     return {
         name: psi + curve.at(let_in[:, chamber] - psi, row_of(name, inputs))
@@ -74,10 +74,10 @@ def _pressure_sensor_others(channels: Channels, curve: LearntCurve, inputs: Inpu
 
 
 SITES = (
-    Site("camera", "what the motion capture says", PLACE, "m", 0.002, (WALK,), readings=_camera),
+    Site("camera", "reading of the motion capture", PLACE, "m", 0.002, (WALK,), readings=_camera),
     Site(
         "camera_memory",
-        "what the motion capture says by how the displacement has changed, by how long ago",
+        "reading of the motion capture, by earlier changes of the displacement",
         Range("time ago (s)", 0.0, 1.2),
         "m/m",
         0.1,
@@ -89,7 +89,7 @@ SITES = (
     *(
         Site(
             f"{prefix}_loading",
-            f"force of the {actuator} actuator's spring while it is loaded slowly, by direction",
+            f"force of the {actuator} actuator's spring in static loading, by direction",
             prefix,
             "N",
             1.0,
@@ -99,10 +99,10 @@ SITES = (
         )
         for prefix, actuator in (("body", "large"), ("small", "small"))
     ),
-    Site("pressure_sensor", "what the pressure sensors say", PRESSURE, "psi", 0.1, readings=_pressure_sensor),
+    Site("pressure_sensor", "reading of the pressure sensors", PRESSURE, "psi", 0.1, readings=_pressure_sensor),
     Site(
         "pressure_sensor_inflow",
-        "what the pressure sensors say by how far the chamber is from what the valve lets in",
+        "reading of the pressure sensors, by the difference between the valve's and the chamber's pressure",
         Range("pressure drop (psi)", -25.0, 25.0),
         "psi",
         0.1,
@@ -112,7 +112,7 @@ SITES = (
     ),
     Site(
         "pressure_sensor_memory",
-        "what the pressure sensors say by how the pressure has changed, by how long ago",
+        "reading of the pressure sensors, by earlier changes of the pressure",
         Range("time ago (s)", 0.0, 0.4),
         "psi/psi",
         0.1,
@@ -123,7 +123,7 @@ SITES = (
     ),
     Site(
         "pressure_sensor_others",
-        "what the pressure sensors say by the pressure of each other chamber",
+        "reading of the pressure sensors, by the pressure of each other chamber",
         PRESSURE,
         "psi",
         0.1,

@@ -1,4 +1,4 @@
-"""What a site declares, and what several have in common."""
+"""The declaration of a site, and functions that several sites share."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lacuna.system import Channels, CorrectionSite
 
 @dataclass(frozen=True)
 class Range:
-    """The quantity that a curve is a function of."""
+    """The independent quantity of a curve, and its range."""
 
     quantity: str
     lower: float
@@ -23,7 +23,7 @@ class Range:
 
 
 PRESSURE = Range("pressure (psi)", -14.5, 14.5)
-SPEED = Range("velocity (m/s)", 0.0, 0.8)  # that a snap-through does not reach
+SPEED = Range("velocity (m/s)", 0.0, 0.8)  # above the speed of a snap-through
 VELOCITY = Range("velocity (m/s)", -0.8, 0.8)
 PLACE = Range("position (m)", -0.1, 0.6)
 DAY = Range("place in the session", 0.0, 1.0)
@@ -31,13 +31,13 @@ DAY = Range("place in the session", 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Site:
-    """Where a curve may be learnt. `over`: a range, or the actuator ("body", "small") over whose spring's range it
-    goes; `scale`: how much of the term, in `unit`, matters; `rows`: one curve each.
+    """A place in the model where a curve may be learnt. `over`: a range, or the actuator ("body", "small") whose
+    spring's range applies; `scale`: size of a change in the term that matters, in `unit`; `rows`: names of the curves.
 
-    A curve of the robot's own equations needs no function: the integrator has it. Others have one, which gets the curve
-    and returns what it gets with the curve in it: `plant(plant, curve, place)`, the robot of one trial;
-    `inputs(inputs, curve, place)`, what was done to it, as it reached it; `readings(channels, curve, inputs, plant)`,
-    those channels that change. `place`: of the trial in the session, 0 for the day's first, 1 for its last.
+    Curves in the robot's own equations need no function, since the integrator has them. Other sites have one of these,
+    which applies the curve: `plant(plant, curve, place)` returns the robot in one trial, `inputs(inputs, curve, place)`
+    the inputs that reach it, `readings(channels, curve, inputs, plant)` the channels that change. `place`: position of
+    the trial in the session, 0 for the day's first, 1 for its last.
     """
 
     name: str
@@ -54,23 +54,23 @@ class Site:
 
     @property
     def equation(self) -> bool:
-        """Whether the curve is in the robot's own equations."""
+        """Whether the site is in the robot's own equations."""
         return self.name in ROWS
 
     def declared(self, springs: Mapping[str, Range]) -> CorrectionSite:
-        """As the engine knows it; `springs`: the range of each actuator's."""
+        """Convert to the engine's type. `springs`: range of each actuator's spring."""
         over = springs[self.over] if isinstance(self.over, str) else self.over
         variable = over.quantity, self.unit, over.lower, over.upper
         return CorrectionSite(self.name, self.term, *variable, self.scale, self.rows, self.experiments, self.knots)
 
 
 def pressures(channels: Channels) -> list[tuple[str, np.ndarray]]:
-    """The channels that are pressures, in the order of the chambers."""
+    """The pressure channels, in the order of the chambers."""
     return [(name, values) for name, values in channels.items() if name.startswith("pressure")]
 
 
 def remembered(values: np.ndarray, time_s: np.ndarray, curve: LearntCurve, row: int) -> np.ndarray:
-    """`values` (n,) with what a curve over the time ago makes of their changes."""
+    """`values` (n,) plus their changes convolved with a curve over the time elapsed since each change."""
     sample_s = float(np.median(np.diff(time_s)))
     ago_s = np.arange(0.5 * sample_s, curve.upper, sample_s)
     changes = np.diff(values, prepend=values[0])
@@ -78,5 +78,5 @@ def remembered(values: np.ndarray, time_s: np.ndarray, curve: LearntCurve, row: 
 
 
 def row_of(channel: str, inputs: Inputs) -> int:
-    """The row of a pressure channel in curves by actuator, the large one's first."""
+    """Row of a pressure channel in curves with a row per actuator: 0 for the large one, 1 for a small one."""
     return 0 if inputs.actuator == "large" or channel == "pressure_body_psi" else 1

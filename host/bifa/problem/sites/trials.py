@@ -1,4 +1,4 @@
-"""What differs from trial to trial: parameters that change over the day, and what was done to the robot."""
+"""Sites that differ from trial to trial: parameters that change over the day, and inputs of the robot."""
 
 from dataclasses import replace
 from functools import partial
@@ -40,10 +40,10 @@ def _grip_pulled(inputs: Inputs, curve: LearntCurve, place: float) -> Inputs:
 
 
 SITES = (
-    Site("area_of_the_day", "the area a of eq. (2), as the day goes on", DAY, "", 0.01, plant=partial(_scaled, _AREAS)),
+    Site("area_of_the_day", "the drift of the area a of eq. (2)", DAY, "", 0.01, plant=partial(_scaled, _AREAS)),
     Site(
         "friction_of_the_day",
-        "the friction's coefficients, as the day goes on",
+        "the drift of the friction coefficients",
         DAY,
         "",
         0.01,
@@ -51,11 +51,11 @@ SITES = (
         plant=partial(_scaled, _FRICTION),
     ),
     Site(
-        "vacuum_of_the_day", "the vacuum, as the day goes on", DAY, "psi", 0.1, (STEP, WALK), plant=_vacuum_of_the_day
+        "vacuum_of_the_day", "the drift of the vacuum supply", DAY, "psi", 0.1, (STEP, WALK), plant=_vacuum_of_the_day
     ),
     Site(
         "valves",
-        "when the valves switch",
+        "delay of the valves",
         DAY,
         "s",
         0.005,
@@ -66,7 +66,7 @@ SITES = (
     ),
     Site(
         "grip_pulled",
-        "friction coefficient of a pulled end, eq. (5), by how far it was pulled",
+        "friction coefficient of a pulled end, eq. (5), by the pulled distance",
         Range("pulled distance (m)", 0.0, 0.08),
         "",
         0.03,

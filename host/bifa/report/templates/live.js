@@ -11,10 +11,10 @@
   const SHOWN_S = 20, LEVEL = { vacuum: 0, off: 0.5, positive: 1, both: 1 };
   const OLD = "bifa monitor does not answer; the data shown are old.";
   const STALE = "This page belongs to an earlier bifa monitor: open the address that the terminal shows now. Stop still works here.";
-  // who listens to a page is told of changes, not ten times a second of what is as it was
+  // write only changes: screen readers would announce unchanged text ten times a second
   const tell = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 
-  // --- What is asked of the robot: over one websocket, so that a stop never waits behind other requests ----------
+  // --- Requests to the robot: over one websocket, so that a stop never waits behind other requests ---------------
   let socket = null, you = null, live = null, number = 0;
   const waiting = new Map();
   const say = (text, wrong = false) => { tell(said, text); said.classList.toggle("wrong", wrong); };
@@ -62,7 +62,7 @@
   }
   closing.addEventListener("change", () => ask("closing", { stop: closing.checked }));
   document.querySelector("form").addEventListener("submit", (event) => event.preventDefault());
-  let sending = 0, shownDraft = ""; // what comes before the answer is older than what the sliders show
+  let sending = 0, shownDraft = ""; // a draft that arrives before the answer is older than what the sliders show
   const draft = async () => {
     sending += 1;
     try { await request("draft", { gait: gait() }); } catch (error) { say(error.message, true); }
@@ -83,7 +83,7 @@
     draft();
   });
 
-  // --- What is so, for every page alike --------------------------------------------------------------------------
+  // --- The state, the same on every page -------------------------------------------------------------------------
   const times = [], traces = Object.fromEntries(chambers.map((name) => [name, { psi: [], valves: [] }]));
   const path = { t: [], mm: [] };
   const lists = [times, path.t, path.mm, ...Object.values(traces).flatMap((trace) => [trace.psi, trace.valves])];
@@ -116,7 +116,7 @@
     for (const output of document.querySelectorAll("[data-robot]")) if (robot) tell(output, String(rounded(robot[output.dataset.robot])));
     showDraft();
     const differs = robot && live.draft && sliders.some(({ name }) => Math.abs(live.draft.gait[name] - robot[name]) > 6e-4);
-    tell(unsent, live.is_pending ? "The robot adopts its new gait at its next cycle." : differs ? "Not sent yet: the robot still has another gait." : robot ? "The sliders show the robot's gait." : "");
+    tell(unsent, live.is_pending ? "The robot adopts its new gait at its next cycle." : differs ? "Not sent yet: the robot still has a different gait." : robot ? "The sliders show the robot's gait." : "");
     const found = live.prediction;
     const isAsked = live.draft && (!found || sliders.some(({ name }) => found.gait[name] !== live.draft.gait[name]));
     if (isAsked) tell(predicted, "Predicting the speed of this gait…");
@@ -136,7 +136,7 @@
   };
 
   const show = () => {
-    tell(state, live.gone ? "the robot is gone" : (live.robot === "connecting" ? "waiting for the robot" : live.warning ? `${live.robot}: ${live.warning}` : live.robot));
+    tell(state, live.gone ? "the robot is disconnected" : (live.robot === "connecting" ? "waiting for the robot" : live.warning ? `${live.robot}: ${live.warning}` : live.robot));
     tell(clock, live.gone || live.uno_s === undefined ? "" : `, ${live.uno_s.toFixed(1)} s`);
     state.classList.toggle("wrong", Boolean(live.gone || live.warning));
     document.body.classList.toggle("old", Boolean(live.gone));
@@ -153,23 +153,23 @@
       phase.setAttribute("aria-valuetext", `${Math.round(360 * share)}°`);
     }
     if (live.position_mm) {
-      const fast = live.robot !== "running" ? "not walking" : live.speed_mm_s === null ? "not for a cycle yet" : live.settled || `${live.speed_mm_s.toFixed(1)} mm/s over the last cycle`;
+      const fast = live.robot !== "running" ? "not walking" : live.speed_mm_s === null ? "less than one cycle walked" : live.settled || `${live.speed_mm_s.toFixed(1)} mm/s over the last cycle`;
       tell(speedBox, `${fast}, at ${live.position_mm.head.toFixed(0)} mm`);
       document.getElementById("path-key").hidden = false;
-    } else if (live.position_mm === null) tell(speedBox, "the head is not seen");
+    } else if (live.position_mm === null) tell(speedBox, "the head is not visible");
     showControls(showGait());
   };
 
   const setUp = () => {
     for (const slider of sliders) {
       [box(slider).min, box(slider).max] = [slider.min, slider.max] = live.ranges[slider.name];
-      // a slider to 60 s would leave no room for the gaits that there are; the number beside it goes to its end
+      // a slider up to 60 s would be too coarse for usual gaits; the number beside it covers the whole range
       if (slider.name === "period_s") slider.max = 12;
     }
     if (!token) say("View and stop only. For control, open the page by the full address that bifa monitor printed.");
   };
 
-  // A panel for pressures, valves and, where it is seen, the head's position; made when there is something to draw.
+  // Panels for pressures, valves and, if it is measured, the head's position; made when there is something to draw.
   let panels = [];
   const panel = (height, label, y, curves, isLast) => {
     const colours = dark.matches ? palettes.dark : palettes.light;
@@ -202,7 +202,7 @@
   };
 
   const draw = () => {
-    if (!window.Chart) return; // it comes last: the page is connected, and Stop works, before it is there
+    if (!window.Chart) return; // the library loads last: the page is connected, and Stop works, before it is there
     if (panels.length !== (path.t.length ? 3 : 2)) setPanels();
     const now = times.length ? times[times.length - 1] : 0;
     for (const one of panels) {

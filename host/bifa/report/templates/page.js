@@ -1,6 +1,6 @@
 "use strict";
 (() => {
-  // --- Plots: drawn in the reader's colours, at the width there is; on paper in light ones.
+  // --- Plots: drawn at the available width, in the reader's colour scheme; on paper in the light one.
   const holder = document.getElementById("plots");
   const content = holder ? JSON.parse(holder.textContent) : { plots: [] };
   const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -32,7 +32,7 @@
     label: { display: Boolean(label), content: label, color: palette.ink, backgroundColor: palette.paper, font: { size: 11 }, padding: 2, position: along === "x" ? "end" : "center" },
   });
 
-  // A column's panels share their x axis: where one is zoomed the others follow.
+  // A column's panels share their x axis: if one is zoomed, the others follow.
   const zoomed = ({ chart }) => {
     const { min, max } = chart.scales.x;
     for (const other of chart.column) if (other !== chart) other.zoomScale("x", { min, max }, "none");
@@ -96,7 +96,7 @@
   drawAll();
   document.documentElement.dataset.drawn = boxes.length;
 
-  // --- Animations: they run by themselves, and stand still for who prefers that; here are pause, clock and slider.
+  // --- Animations: they run by themselves, unless the reader prefers reduced motion; with pause, clock and slider.
   for (const figure of document.querySelectorAll(".motion")) {
     const moves = figure.querySelector("svg").getAnimations({ subtree: true });
     const [seconds, shown] = [figure.dataset.seconds, figure.dataset.shown].map(Number);
@@ -113,7 +113,7 @@
     button.addEventListener("click", () => go(!running));
     slider.addEventListener("input", () => {
       go(false);
-      const share = Math.min(slider.value / shown, 1 - 1e-6); // the very end is the beginning again
+      const share = Math.min(slider.value / shown, 1 - 1e-6); // the very end would wrap to the beginning
       moves.forEach((move) => { move.currentTime = 1000 * seconds * share; });
       say();
     });

@@ -1,6 +1,6 @@
-"""Many simulations of one kind at once: a lane each of the processor's vectors, in C (docs/model.md).
+"""Many simulations of one kind at once, in C, each in a lane of the processor's vectors (docs/lanes.md).
 
-What is done here has one form in lanes and one in numba; where no compiler is at hand, numba's serves.
+Without a C compiler, the same simulations run in numba.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ __all__ = [
 ]
 
 
-_WORTH_LANES = 3  # simulations: a step of all lanes costs a little more than two of a single one
+_WORTH_LANES = 3  # fewest simulations to run in lanes: a step of all lanes costs a little more than two of one lane
 SEEN_OF_WALK = [X_HEAD, V_HEAD, X_TAIL, V_TAIL, READ_BODY, READ_BODY + 1, READ_BODY + 2]
 _PROGRESS_OF_WALK = [X_HEAD, SLIP]
 
 
 def width() -> int:
-    """Simulations that run side by side."""
+    """Number of simulations that run side by side."""
     found = kernels()
     return found[0].lanes if found else 1
 
@@ -49,10 +49,10 @@ def _kernels_for(plants: Sequence[Plant]) -> tuple[Kernel, Kernel] | None:
 
 
 def march(plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.ndarray]:
-    """Rows (columns, samples) of each robot's experiment.
+    """Run each robot's experiment. Returns rows (columns, samples) for each.
 
-    `together`: for robots that differ little, as for derivatives. They march with the same steps, so that what the
-    integrator does wrong is alike and drops out of the differences from the first robot.
+    `together`: for robots that differ little, as in derivatives. They share their steps, so that the integrator's
+    errors are nearly equal and cancel in the differences from the first robot.
     """
     found = _kernels_for(plants)
     if found is None:
@@ -64,7 +64,8 @@ def march(plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.
 
 
 def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment) -> list[np.ndarray]:
-    """The first robot leads each pack: what its runs differ by is taken from the others of their packs."""
+    """March in packs that each contain the first robot, and shift each pack so that its run of the first robot
+    equals that in the first pack."""
     others = kernel.lanes - 1
     packs = [[0, *range(k, min(k + others, len(plants)))] for k in range(1, len(plants), others)]
     order = [k for pack in packs for k in pack]
@@ -89,7 +90,7 @@ def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment)
 def load(
     plants: Sequence[Plant], rigs: Sequence[Mounting], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
 ) -> list[np.ndarray]:
-    """Rows (2, samples) of each robot's static loading: force in N, reading in psi."""
+    """Run each robot's static loading. Returns rows (2, samples) for each: force in N, pressure reading in psi."""
     found = _kernels_for(plants)
     if found is None:
         return load_in_numba(plants, rigs, paths_m, sample_s)
@@ -107,8 +108,8 @@ def load_in_numba(
 
 
 def sealed_plant(plant: Plant) -> Plant:
-    """The same with tables that are read-only, as they are no longer after a journey between processes: numba would
-    compile everything once more for those that can be written."""
+    """A copy whose tables are read-only. They become writable when pickled to another process, and numba would compile
+    everything a second time for writable ones."""
     return plant._replace(body_curve=sealed(plant.body_curve.view()), small_curve=sealed(plant.small_curve.view()))
 
 

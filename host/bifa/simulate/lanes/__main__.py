@@ -1,4 +1,4 @@
-"""Compile the kernels for this processor, if that is still to be done: `python -m bifa.simulate.lanes`."""
+"""Compile the kernels for this processor unless they are cached: `python -m bifa.simulate.lanes`."""
 
 from bifa.simulate.lanes.kernel import kernels
 

@@ -1,4 +1,4 @@
-"""Compiles the kernel into the user's cache, once for each change of its sources, in a few seconds."""
+"""Compiles the kernel into the user's cache whenever its sources have changed. Takes a few seconds."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OWN = ("translate.py", "program.py", "vectors.h", "tables.h", "drive.c")
 
 @dataclass(frozen=True)
 class Target:
-    """A kind of processor: lanes of its vectors, what the compiler is told, and what the processor must have."""
+    """A kind of processor: number of lanes, compiler flags, and CPU features that it needs."""
 
     lanes: int
     flags: tuple[str, ...]
@@ -42,7 +42,7 @@ class NoCompilerError(Exception):
 
 @cache
 def target() -> Target:
-    """Of this processor."""
+    """The widest target that this processor supports."""
     from llvmlite import binding
 
     has = binding.get_host_cpu_features()
@@ -50,12 +50,12 @@ def target() -> Target:
 
 
 def single() -> Target:
-    """One lane, for this processor."""
+    """A target with one lane, for this processor."""
     return Target(1, target().flags if target().lanes > 2 else (), ())
 
 
 def compiler() -> str:
-    """The C compiler: CC, else cc, gcc or clang; NoCompilerError if there is none."""
+    """Path of the C compiler: CC, else cc, gcc or clang. Raises NoCompilerError if there is none."""
     for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
         if name and (found := shutil.which(name.split()[0])):
             return found
@@ -63,7 +63,7 @@ def compiler() -> str:
 
 
 def library(chosen: Target) -> Path:
-    """The compiled kernel, made now if it is missing. NoCompilerError where it is missing and cannot be made."""
+    """Path of the compiled kernel, compiled now if missing. Raises NoCompilerError if that fails."""
     texts = [(HERE / name).read_text("utf-8") for name in _OWN]
     name = f"bifa_lanes_{generated.digest(*entries.sources(), *texts, *FLAGS, *chosen.flags)}_{chosen.lanes}.so"
     path = generated.folder() / name
@@ -76,7 +76,7 @@ def library(chosen: Target) -> Path:
 
 
 def compile_to(path: Path, chosen: Target) -> None:
-    """Make a kernel; NoCompilerError where that fails."""
+    """Compile a kernel to `path`. Raises NoCompilerError if that fails."""
     from bifa.simulate.lanes import program
 
     command = [compiler(), *FLAGS, *chosen.flags, f"-DLANES={chosen.lanes}"]

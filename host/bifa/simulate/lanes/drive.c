@@ -1,18 +1,18 @@
-// Runs experiments in lanes. Every lane goes from event to event (a switch of a valve, a sample) of its own; lanes that
-// march together take every step together, so that one lane's event ends the step of all.
+// Runs experiments in lanes. Each lane advances from event to event (a valve switch, a sample) of its own. Lanes that
+// march together share every step, so that one lane's event ends the step of all.
 
-// One simulation. Arrays of doubles unless said otherwise.
+// One simulation.
 typedef struct {
     const double *q;
     int64_t active;
-    const double *body_curve, *small_curve, *learnt; // learnt: NULL if nothing was
+    const double *body_curve, *small_curve, *learnt; // learnt: NULL without learnt curves
     double incline_rad, positive_psi, negative_psi, share[3];
     const double *switch_s;
     const int64_t *chamber, *command;
     int64_t switches;
-    const double *sample_s, *path; // path: of a static loading, m
+    const double *sample_s, *path; // path: displacements of a static loading, m
     int64_t samples;
-    double *rows; // result: columns of as many values as there are samples
+    double *rows; // result: for each column, one value per sample
 } Job;
 
 typedef struct {
@@ -28,7 +28,7 @@ static const int COLUMNS_OF[] = {WALK_COLUMNS, 7, 2, 3, 5};
 
 typedef struct {
     const Job *job;
-    double *late_s; // when its valves switch, in order
+    double *late_s; // times at which the valves switch, in order
     int64_t *order;
     int64_t room, next_switch, next_sample;
     int what;
@@ -62,7 +62,7 @@ static void set_run(Run *run, int i) {
     set_lane(&run->slip[0], i, 0.0);
 }
 
-// A job's robot and where it is mounted, in lane i, at rest.
+// Set up a job's robot and mounting in lane i, at rest.
 static void mount(Bench *bench, const Setting *setting, const Job *job, int i) {
     Plant *plant = &bench->plant;
     for (int k = 0; k < NUMBERS; k++) set_lane(&plant->q[k], i, job->q[k]);
@@ -90,7 +90,7 @@ static void mount(Bench *bench, const Setting *setting, const Job *job, int i) {
     set_run(&bench->run, i);
 }
 
-// The next event of lane i; false after the last sample.
+// Schedule the next event of lane i. Returns 0 after the last sample.
 static int plan(Bench *bench, int i) {
     Schedule *s = &bench->schedule[i];
     const Job *job = s->job;
@@ -102,8 +102,8 @@ static int plan(Bench *bench, int i) {
     return 1;
 }
 
-// Switching times with the valves' delays, in order; of equal ones the earlier command first. An edge that a later
-// command overtakes ends with it.
+// Sort the switching times, including the valves' delays; at equal times the earlier command comes first. A switch
+// never takes effect after a later one of the same chamber. Returns 0 if memory runs out.
 static int sort_switches(Schedule *s, double to_positive_s, double otherwise_s) {
     const Job *job = s->job;
     if (s->room < job->switches) {
@@ -133,7 +133,7 @@ static int sort_switches(Schedule *s, double to_positive_s, double otherwise_s) 
     return 1;
 }
 
-// Begin a job in lane i; false for want of memory.
+// Begin a job in lane i. Returns 0 if memory runs out.
 static int begin(Bench *bench, const Setting *setting, const Job *job, int i) {
     mount(bench, setting, job, i);
     const Mask m = lane(i);
@@ -149,7 +149,7 @@ static int begin(Bench *bench, const Setting *setting, const Job *job, int i) {
     }
     int more = 1;
     if (setting->experiment == ANCHOR) {
-        s->what = EXTEND; // for the first half of the time before time 0
+        s->what = EXTEND; // in the first half of the interval before time 0
         set_lane(&bench->rig.positive_psi, i, fmax(job->positive_psi, setting->extended_psi));
         set_lane(&bench->until, i, 0.5 * at_lane(bench->run.clock[0], i));
     } else if (setting->experiment == STEP) {
@@ -184,7 +184,7 @@ static void sample(Bench *bench, const Setting *setting, Mask m) {
     }
 }
 
-// What happens where lanes have arrived; lanes that have ended take up the next job.
+// Handle the events at which lanes have arrived; finished lanes take the next job. Returns 0 if memory runs out.
 static int happen(Bench *bench, const Setting *setting, Mask arrived, const Job **next, const Job *end) {
     bench->run.clock[0] = sel(arrived, bench->until, bench->run.clock[0]);
     arrive_at(arrived, &bench->plant, &bench->run);
@@ -216,7 +216,7 @@ static int happen(Bench *bench, const Setting *setting, Mask arrived, const Job 
 static int run_all(Bench *bench, const Setting *setting, const Job *jobs, const Job *end) {
     const Job *next = jobs;
     bench->run.live = no_lanes();
-    for (int i = 0; i < LANES; i++) mount(bench, setting, jobs, i); // a lane without a job is not left undefined
+    for (int i = 0; i < LANES; i++) mount(bench, setting, jobs, i); // so that lanes without a job are defined
     for (int i = 0; i < LANES && next < end; i++)
         if (!begin(bench, setting, next++, i)) return 0;
     const V tolerance = splat(setting->tolerance_m);
@@ -242,8 +242,8 @@ static Bench *new_bench(const Setting *setting) {
     return bench;
 }
 
-// `count` simulations; those that march together do so in packs of LANES, one after the other. 0 or, for want of
-// memory, 1.
+// Run `count` simulations; those that march together do so in successive packs of LANES. Returns 0, or 1 if memory runs
+// out.
 int march_jobs(const Setting *setting, const Job *jobs, int64_t count) {
     Bench *bench = new_bench(setting);
     if (!bench) return 1;
@@ -262,7 +262,7 @@ int march_jobs(const Setting *setting, const Job *jobs, int64_t count) {
     return !done;
 }
 
-// Static loadings, sampled at the same times.
+// Run static loadings, all sampled at the same times. Returns 0, or 1 if memory runs out.
 int load_jobs(const Setting *setting, const Job *jobs, int64_t count) {
     const int64_t samples = count ? jobs->samples : 0;
     Bench *bench = new_bench(setting);
@@ -289,6 +289,6 @@ int load_jobs(const Setting *setting, const Job *jobs, int64_t count) {
 
 int lanes_of_kernel(void) { return LANES; }
 
-// Effects that have no form in lanes, as bits, and why.
+// Bits of the effects that could not be translated, and the reasons.
 int64_t refused_effects(void) { return REFUSED; }
 const char *refusals(void) { return REFUSALS; }

@@ -1,4 +1,4 @@
-"""The compiled kernel as Python calls it: jobs in, rows out."""
+"""Python interface of the compiled kernel: jobs in, rows out."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class _Setting(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is done to each robot, switches and sample times of each; and what is the same for all."""
+    """An experiment on several robots: mounting, switches and sample times of each, and the settings common to all."""
 
     kind: int
     rigs: Sequence[Mounting]
@@ -62,7 +62,7 @@ class Experiment:
 
 
 class Kernel:
-    """A compiled kernel of so many `lanes`. Its calls release the GIL."""
+    """A compiled kernel with `lanes` lanes. Its calls release the GIL."""
 
     def __init__(self, path: Path) -> None:
         library = ctypes.CDLL(str(path))
@@ -75,8 +75,8 @@ class Kernel:
             function.restype = ctypes.c_int
 
     def march(self, plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.ndarray]:
-        """Rows, (columns, samples) for each robot. `together`: packs of `lanes` share their steps; else each lane
-        has its own, and takes up the next robot when it has finished one."""
+        """Run an experiment. Returns rows (columns, samples) for each robot. `together`: packs of `lanes` robots share
+        their steps; otherwise each lane has steps of its own, and takes the next robot when it has finished one."""
         jobs, setting, kept = _jobs(plants, what.rigs)
         setting.experiment, setting.together, setting.tolerance_m = what.kind, together, what.tolerance_m
         setting.extended_psi = what.extended_psi
@@ -94,7 +94,7 @@ class Kernel:
     def load(
         self, plants: Sequence[Plant], rigs: Sequence[Mounting], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
     ) -> list[np.ndarray]:
-        """Rows (2, samples) of a static loading for each robot, force in N and reading in psi."""
+        """Run static loadings. Returns rows (2, samples) for each robot: force in N, pressure reading in psi."""
         jobs, setting, kept = _jobs(plants, rigs)
         jobs["path"], jobs["sample_s"], jobs["samples"] = _addresses(paths_m), _address(sample_s), sample_s.size
         rows = _rows_for(jobs, 2)
@@ -104,13 +104,14 @@ class Kernel:
 
     @staticmethod
     def call(function: Callable[..., int], setting: _Setting, jobs: np.ndarray) -> None:
-        """Where the time goes that is not Python's. MemoryError where there is none left."""
+        """Call a kernel function; all time outside Python is spent here. Raises MemoryError if memory runs out."""
         if function(ctypes.addressof(setting), _address(jobs), len(jobs)):
             raise MemoryError("out of memory for a simulation")
 
 
 def _jobs(plants: Sequence[Plant], rigs: Sequence[Mounting]) -> tuple[np.ndarray, _Setting, object]:
-    """The jobs' robots and mountings, the setting, and what must live as long as they do."""
+    """Jobs with robots and mountings filled in, the setting, and the objects that must stay alive as long as they are
+    used."""
     jobs = np.zeros(len(plants), _JOB)
     learnt = [plant.learnt for plant in plants]
     curved = next((table for table in learnt if len(table)), None)
@@ -144,14 +145,14 @@ def _address(array: np.ndarray) -> int:
 
 
 def _addresses(arrays: Sequence[np.ndarray]) -> list[int]:
-    """Of each; arrays that several jobs share are asked once, which is slow."""
+    """Address of each array, looked up once per distinct array, since the lookup is slow."""
     known = {id(array): array for array in arrays}
     found = {key: _address(array) for key, array in known.items()}
     return [found[id(array)] for array in arrays]
 
 
 def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
-    """Where each job's results go, (columns, samples)."""
+    """Allocate the results of each job, (columns, samples)."""
     sizes = columns * jobs["samples"]
     ends = np.cumsum(sizes)
     starts, whole = ends - sizes, np.empty(ends[-1])
@@ -162,8 +163,8 @@ def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
 
 @cache
 def kernels() -> tuple[Kernel, Kernel] | None:
-    """One with this processor's lanes and one with a single lane. None where BIFA_LANES is 0 or no compiler is at hand,
-    which is said once."""
+    """A kernel with this processor's lanes and one with a single lane. None if BIFA_LANES is 0, or without a compiler,
+    which is then reported once."""
     if os.environ.get("BIFA_LANES") == "0":
         return None
     try:

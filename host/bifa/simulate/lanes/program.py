@@ -1,4 +1,4 @@
-"""The kernel's source in C: the simulator's functions, translated, between what they work on and what drives them."""
+"""The kernel's C source: data structures, the translated functions of the simulator, and the driver."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _INTRINSICS: dict[Any, Intrinsic] = {
     together.anywhere: Intrinsic("any({0})", "b"),
 }
 _BENCH = ("Plant", "Mounting", "Run")
-# What drive.c calls: its name there, the function, the kinds of its arguments, and whether it is of all lanes.
+# The functions that drive.c calls: name there, function, kinds of its arguments, whether it always runs in all lanes.
 _CALLED = (
     ("delay_of", chains.delay, ("Active", "F[]", "b"), True),
     ("start_walk", locomotion.contracted, _BENCH, False),
@@ -74,7 +74,8 @@ def _apart(function: Callable[..., Any]) -> bool:
 
 @cache
 def source() -> str:
-    """All of it, for any number of LANES. An effect that has no form in lanes is left out, and said to be."""
+    """The complete source, for any number of LANES. Effects that cannot be translated are left out and listed in
+    REFUSED and REFUSALS."""
     refused: dict[str, str] = {}
 
     def without(function: Callable[..., Any], refusal: UntranslatableError) -> Intrinsic | None:

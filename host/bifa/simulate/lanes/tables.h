@@ -1,5 +1,5 @@
-// What a kernel works on, a vector of lanes where the numba code has a number (bifa.simulate: Plant, Mounting, Run).
-// NUMBERS, MEMORY and the constants of the layout are defined before.
+// The kernel's data structures: Plant, Mounting and Run of bifa.simulate, with a vector of lanes for each number.
+// NUMBERS, MEMORY and the constants of the layout are defined above.
 
 typedef struct {
     const double *at;
@@ -12,20 +12,20 @@ typedef struct {
     long columns;
 } Rows;
 
-// A stiffness table a lane, as bifa.simulate.tables has it.
+// One stiffness table per lane, laid out as in bifa.simulate.tables.
 typedef struct {
     const double *rows[LANES];
     V lower, upper, per_width;
     long count;
 } Curve;
 
-// Learnt curves a lane (bifa.simulate.learnt); no terms: nothing was learnt.
+// Learnt curves of each lane (bifa.simulate.learnt); no terms if nothing was learnt.
 typedef struct {
     const double *rows[LANES];
     long terms, columns;
 } Learnt;
 
-// bifa.simulate.terrain, the same in all lanes.
+// A table of bifa.simulate.terrain, the same in all lanes.
 typedef struct {
     const double *rows;
     long height, columns;
@@ -33,8 +33,8 @@ typedef struct {
 
 typedef struct {
     V q[NUMBERS];
-    int64_t active[LANES], any; // bits of each lane, of effects and learnt curves, and of all together
-    int same;                   // in all lanes
+    int64_t active[LANES], any; // bits of effects and learnt curves, for each lane and for all combined
+    int same;                   // whether the bits are the same in all lanes
     Curve body_curve, small_curve;
     Learnt learnt;
 } Plant;
@@ -48,8 +48,8 @@ typedef struct {
 typedef struct {
     V y[STATES], z[MEMORY], clock[3], slip[1], command[3], gravity[2], source[3];
     V whole[STATES], first[STATES], halves[STATES], z_whole[MEMORY], z_first[MEMORY], z_halves[MEMORY], read[3];
-    Mask live;    // the others have nothing to do, and go nowhere
-    int together; // the lanes share their steps
+    Mask live;    // lanes with a simulation; the others are idle
+    int together; // whether the lanes share their steps
 } Run;
 
 MERGED Mask having(const Plant *plant, int64_t bits) {
@@ -68,7 +68,7 @@ typedef struct {
     V r0, r1, r2, r3;
 } Four;
 
-// In the place of what could not be translated; nobody asks for it.
+// Replacements for functions that could not be translated; never called.
 MERGED V nothing(void) { return splat(NAN); }
 typedef struct {
     V r0, r1;
@@ -77,7 +77,7 @@ MERGED Two nothing_twice(void) { return (Two){splat(NAN), splat(NAN)}; }
 
 MERGED Three reach_of(const Curve *curve) { return (Three){curve->lower, curve->upper, curve->per_width}; }
 
-// Four coefficients of each lane's own row.
+// The four coefficients in each lane's own row.
 MERGED Four row_of(const Curve *curve, V row) {
     const V place = v_min(v_max(splat(1.0), row), splat((double)(curve->count - 1)));
 #if LANES == 8 && defined(__AVX512F__)

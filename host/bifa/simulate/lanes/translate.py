@@ -1,16 +1,16 @@
-"""From the integrator's Python to C in lanes.
+"""Translates the integrator's Python into C that runs in lanes.
 
-The functions of the simulator and of the effects are written once, in the plain Python that numba compiles. Here the
-same functions become C in which a number is a vector of lanes. What differs from lane to lane is told from what is the
-same in all by following the kinds of the arguments; where a condition differs, both branches are taken, each for its
-lanes (a mask), and skipped where it has none. Loops, `break`, `continue` and early returns take lanes out of the mask.
+The functions of the simulator and of the effects are written once, in the plain Python that numba compiles. Here they
+become C in which a number is a vector of lanes. Propagating the kinds of the arguments tells which values differ
+between lanes and which are the same in all. Where a condition differs, both branches are executed, each for the lanes
+in its mask, and a branch without lanes is skipped. `break`, `continue` and early returns remove lanes from the mask.
 
-The Python that is understood: arithmetic, comparisons, `and`/`or`/`not`, conditional expressions, `if`, `for` over a
-range, `while` is not needed; calls of other such functions and of `math`; numbers and arrays handed in as arguments.
+Supported Python: arithmetic, comparisons, `and`/`or`/`not`, conditional expressions, `if`, `for` over a range (no
+`while`), calls of other such functions and of `math`, and numbers and arrays passed as arguments.
 
-Kinds: `f`, `i`, `b` a number, an integer, a truth that is the same in all lanes; `F` and `B` a number (integers, too)
-and a truth for each lane. `F[n]` an array of `F` (n may be left out), `f[]` one of `f`; anything else names a structure
-or a table (`Shapes`).
+Kinds: `f`, `i`, `b` are a number, an integer, a truth value that is the same in all lanes; `F` and `B` are a number
+(also an integer) and a truth value per lane. `F[n]` is an array of `F` (n may be omitted), `f[]` one of `f`; anything
+else names a structure or a table (`Shapes`).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from typing import Any
 import numpy as np
 
 C_TYPES = {"f": "double", "i": "long", "b": "int", "F": "V", "B": "Mask", "f[]": "Series"}
-_UNROLLED = 16  # turns of a loop that are written out
+_UNROLLED = 16  # most iterations of a loop that is unrolled
 _SAME_IN_ALL = ("f", "i", "b")
 _COMPARISONS = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
 _SIGNS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-# Of C's <math.h>, and of vectors.h with a leading "v_".
+# Names in C's <math.h>, and in vectors.h with a leading "v_".
 _MATH = {
     math.exp: "exp", math.log: "log", math.sqrt: "sqrt", math.sin: "sin", math.cos: "cos", math.tan: "tan",
     math.tanh: "tanh", math.atan: "atan", math.floor: "floor", math.ceil: "ceil", math.fabs: "fabs",
@@ -45,15 +45,16 @@ _Coded = tuple[str, Kind]  # an expression in C, and its kind
 
 
 class UntranslatableError(Exception):
-    """A function does what has no form in lanes; the text says where and what."""
+    """A function contains something that cannot be translated; the text says where and what."""
 
 
 @dataclass(frozen=True)
 class Shapes:
-    """What structures and tables look like.
+    """Layout of structures and tables in C.
 
-    fields: of each structure, kind by field. constants: `(array kind, "size")` or `(table, "shape", axis)` in C, `{}`
-    for the object. tables: how an entry (table, row, column) of each table is had, C for lanes' own indices.
+    fields: for each structure, the kind of each field. sizes: C code for the size of a table along an axis, with `{}`
+    for the table. tables: C code for an entry of each table, formatted with table, row and column, which may differ
+    between lanes.
     """
 
     fields: Mapping[str, Mapping[str, str]]
@@ -63,7 +64,7 @@ class Shapes:
 
 @dataclass(frozen=True)
 class Intrinsic:
-    """C of a function that is not translated: `{m}` the mask, `{0}` ... the arguments (numbers as `F`)."""
+    """C code that replaces a function: `{m}` is the mask, `{0}` ... are the arguments (numbers as `F`)."""
 
     code: str
     returns: Kind
@@ -71,7 +72,7 @@ class Intrinsic:
 
 @dataclass
 class Translated:
-    """One function for one choice of the arguments' kinds."""
+    """Translation of one function for one combination of argument kinds."""
 
     name: str
     returns: Kind
@@ -89,9 +90,9 @@ def c_type(kind: Kind) -> str:
 
 
 class Translator:
-    """Collects the functions that are asked for and all that they call. `apart`: whether a function stays one, because
-    it is rarely called or too often to be merged into every caller. `instead`: what stands for a function that has no
-    form in lanes, None: then nothing has."""
+    """Translates the requested functions and all that they call. `apart`: whether a function is not inlined, because it
+    is rarely called or has too many callers. `instead`: replacement for a function that cannot be translated; None to
+    fail."""
 
     def __init__(
         self,
@@ -107,7 +108,8 @@ class Translator:
         self._count = 0
 
     def function(self, function: Callable[..., Any], kinds: tuple[str, ...], whole: bool = True) -> Translated:
-        """The translation for arguments of these kinds. `whole`: of all lanes; else the mask is its first argument."""
+        """Translate a function for arguments of these kinds. `whole`: it always runs in all lanes; otherwise its first
+        argument is the mask."""
         function = getattr(function, "py_func", function)
         key = (function, kinds, whole)
         if key not in self._done:
@@ -118,7 +120,7 @@ class Translator:
         return self._done[key]
 
     def array(self, values: np.ndarray) -> str:
-        """C name of a constant array."""
+        """Name in C of a constant array."""
         numbers = ", ".join(repr(float(value)) for value in values)
         if numbers not in self._arrays:
             self._arrays[numbers] = name = f"array_{len(self._arrays)}"
@@ -128,7 +130,7 @@ class Translator:
 
 @dataclass
 class _Region:
-    """Code that is run for the lanes of `mask`, a variable; `full`: of all lanes, so that nothing need be kept."""
+    """Code that runs for the lanes in the variable `mask`. `full`: for all lanes, so no values need be preserved."""
 
     mask: str
     full: bool
@@ -137,12 +139,12 @@ class _Region:
 
 @dataclass
 class _Loop:
-    left: str  # lanes that have left the loop
-    skipped: str  # lanes that have left this turn
+    left: str  # lanes that have left the loop (break)
+    skipped: str  # lanes that have left this iteration (continue)
 
 
 class _Body:
-    """One function on its way into C."""
+    """Translation of one function in progress."""
 
     def __init__(
         self, translator: Translator, function: Callable[..., Any], kinds: tuple[Kind, ...], whole: bool, name: str
@@ -150,7 +152,8 @@ class _Body:
         self.translator, self.shapes, self.whole, self.name = translator, translator.shapes, whole, name
         self.function = function
         try:
-            source = textwrap.dedent(inspect.getsource(function))
+            lines, self.first_line = inspect.getsourcelines(function)
+            source = textwrap.dedent("".join(lines))
             self.tree = next(node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef))
         except (OSError, StopIteration, SyntaxError) as e:
             raise UntranslatableError(f"{function.__module__}.{function.__name__}: its source is not available") from e
@@ -163,11 +166,11 @@ class _Body:
         self.single = True
 
     def _no(self, node: ast.AST, what: str) -> UntranslatableError:
-        where = f"{self.function.__module__}.{self.function.__name__}"
-        return UntranslatableError(f"{where}: line {getattr(node, 'lineno', 0)} {what}")
+        line = self.first_line + getattr(node, "lineno", 1) - 1
+        return UntranslatableError(f"{inspect.getsourcefile(self.function)}:{line}: {self.function.__name__} {what}")
 
     def translate(self, inline: str) -> Translated:
-        while True:  # until no variable turns out to differ from lane to lane that was thought the same
+        while True:  # repeat until no further variable turns out to differ between lanes
             before = (dict(self.kinds), list(self.returned or ()))
             self.lines: list[str] = []
             self.regions_of: dict[str, _Region] = {}
@@ -255,7 +258,7 @@ class _Body:
         if len(parts) != len(target.elts):
             raise self._no(node, f"unpacks {len(parts)} values into {len(target.elts)} names")
         held = []
-        for code, kind in parts:  # all before the first is stored
+        for code, kind in parts:  # evaluate all before storing the first
             name = self._fresh("t")
             self._emit(f"{c_type(kind)} {name} = {code}; (void){name};")
             held.append((name, kind))
@@ -275,7 +278,7 @@ class _Body:
         return self._members(code, kind)
 
     def _members(self, code: str, kinds: tuple[Kind, ...]) -> list[_Coded]:
-        """Of the structure that a call returns."""
+        """The members of the structure that a call returns."""
         name = self._fresh("r")
         self._emit(f"const __auto_type {name} = {code};")
         return [(f"{name}.r{i}", one) for i, one in enumerate(kinds)]
@@ -298,10 +301,10 @@ class _Body:
                 place = self._place(target)
                 self._emit(f"{self._kept(place, _as(code, kind, 'F'))};")
             case _:
-                raise self._no(target, "stores where it cannot")
+                raise self._no(target, "has an unsupported assignment target")
 
     def _kept(self, place: str, code: str, select: str = "sel") -> str:
-        """Assign for the lanes of the region."""
+        """Code of an assignment in the lanes of the region."""
         if self.region.full:
             return f"{place} = {code}"
         return f"{place} = {select}({self.region.mask}, {code}, {place})"
@@ -314,7 +317,7 @@ class _Body:
             return
         known = self.kinds.get(name)
         first = self.regions_of.setdefault(name, self.region if name not in self.given else self.top)
-        if kind in _SAME_IN_ALL and self.region.mask != first.mask:  # some lanes keep the value that they have
+        if kind in _SAME_IN_ALL and self.region.mask != first.mask:  # the other lanes keep their values
             kind, code = _varying(kind), _as(code, kind, _varying(kind))
         joined = _joined(known, kind)
         if joined is None:
@@ -365,7 +368,7 @@ class _Body:
             return
         joined = [_joined(old, new) for old, new in zip(self.returned, kinds, strict=True)]
         if None in joined:
-            raise self._no(node, "returns now this, now that")
+            raise self._no(node, "returns values of incompatible kinds")
         self.returned = joined
 
     def _do_if(self, node: ast.If) -> None:
@@ -402,7 +405,7 @@ class _Body:
         self.jumped = jumped or self.jumped
 
     def _uniform(self, statements: Sequence[ast.stmt]) -> None:
-        """A branch that all lanes of the region take, or none."""
+        """Translate a branch that either all lanes of the region take, or none."""
         outer = self.region
         self.region = _Region(outer.mask, outer.full, outer.loop)
         jumped, self.jumped = self.jumped, False
@@ -414,7 +417,7 @@ class _Body:
         self.jumped = jumped or self.jumped
 
     def _take_out(self, region: _Region) -> None:
-        """Lanes that have left the function, the loop or this turn of it are no longer run."""
+        """Remove the lanes that have left the function, the loop or its present iteration from the mask."""
         lost = "gone"
         if region.loop:
             lost = f"or_(gone, or_({region.loop.left}, {region.loop.skipped}))"
@@ -426,14 +429,14 @@ class _Body:
             case ast.Call(func=ast.Name(id="range"), args=[last]) if isinstance(node.target, ast.Name):
                 end, kind = self._value(last)
             case ast.Tuple(elts=elements) if isinstance(node.target, ast.Name):
-                for element in elements:  # a few constants: one after the other
+                for element in elements:  # a few constants: unrolled
                     self._store_name(node, node.target.id, *self._value(element))
                     self._block(node.body)
                 return
             case _:
                 raise self._no(node, "loops over something other than a range")
         if kind != "i" or node.orelse:
-            raise self._no(node, "loops as often as only a lane knows")
+            raise self._no(node, "has an unsupported loop: its count must be the same in all lanes, without an else")
         name = node.target.id
         if _joined(self.kinds.get(name), "i") != "i":
             raise self._no(node, f"loops over {name}, which is in use already")
@@ -475,7 +478,7 @@ class _Body:
 
     def _leave(self, node: ast.stmt, which: str) -> None:
         if self.region.loop is None:
-            raise self._no(node, "leaves no loop")
+            raise self._no(node, "uses break or continue outside a loop over a range")
         lanes = getattr(self.region.loop, which)
         self._emit(f"{lanes} = or_({lanes}, {self.region.mask});")
         self.jumped = True
@@ -508,7 +511,7 @@ class _Body:
         return self._constant(node, self._object(node))
 
     def _object(self, node: ast.expr) -> Any:
-        """A constant, a function or a module that the source names."""
+        """The constant, function or module that the source refers to."""
         if isinstance(node, ast.Attribute):
             return getattr(self._object(node.value), node.attr)
         if isinstance(node, ast.Name):
@@ -579,13 +582,13 @@ class _Body:
 
     def _pair(self, node: ast.expr) -> list[ast.expr]:
         if not isinstance(node, ast.Tuple) or len(node.elts) != 2:
-            raise self._no(node, "looks into a table not by row and column")
+            raise self._no(node, "indexes a table other than by row and column")
         return node.elts
 
     def _index(self, node: ast.expr) -> str:
         at, kind = self._value(node)
         if kind not in ("i", "b"):
-            raise self._no(node, "looks up a place that differs from lane to lane")
+            raise self._no(node, "uses an index that differs from lane to lane")
         return at
 
     def _of_unaryop(self, node: ast.UnaryOp) -> _Coded:
@@ -594,7 +597,7 @@ class _Body:
             return (f"(!({code}))", "b") if kind == "b" else (f"not_({code})", "B")
         code, kind = self._value(node.operand)
         if not isinstance(node.op, ast.USub):
-            raise self._no(node, "has an operator that is not understood")
+            raise self._no(node, "has an operator that is not supported")
         return f"(-({_as(code, kind, 'f' if kind == 'b' else kind)}))", kind
 
     def _of_binop(self, node: ast.BinOp) -> _Coded:
@@ -614,7 +617,7 @@ class _Body:
             return f"pow({a}, {b})", "f"
         sign = _ARITHMETIC.get(type(node.op))
         if sign is None:
-            raise self._no(node, "has an operator that is not understood")
+            raise self._no(node, "has an operator that is not supported")
         if varying:
             return f"({_as(a, ka, 'F')} {sign} {_as(b, kb, 'F')})", "F"
         if sign == "/":
@@ -628,7 +631,7 @@ class _Body:
         for operation, (a, ka), (b, kb) in zip(node.ops, parts, parts[1:], strict=False):
             name = _COMPARISONS.get(type(operation))
             if name is None:
-                raise self._no(node, "compares in a way that is not understood")
+                raise self._no(node, "has a comparison that is not supported")
             if ka in _SAME_IN_ALL and kb in _SAME_IN_ALL:
                 found.append((f"({a} {_SIGNS[name]} {b})", "b"))
             else:
@@ -684,7 +687,7 @@ class _Body:
 
     def _of_call(self, node: ast.Call) -> _Coded:
         if node.keywords:
-            raise self._no(node, "names arguments in a call")
+            raise self._no(node, "passes keyword arguments in a call")
         function = self._object(node.func)
         arguments = [self._value(one) for one in node.args]
         kinds = [kind for _, kind in arguments]
@@ -740,7 +743,7 @@ def _varying(kind: str) -> str:
 
 
 def _joined(a: Kind | None, b: Kind) -> Kind | None:
-    """The kind that holds both, None if there is none."""
+    """The kind that can hold both; None if there is none."""
     if a is None or a == b:
         return b
     pair = {a, b}

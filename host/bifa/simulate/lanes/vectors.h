@@ -1,5 +1,5 @@
-// A vector of W numbers, one a lane, and a mask of lanes: for AVX-512, for AVX2, for any other processor by the
-// compiler's own vectors, and for W = 1 as plain numbers. What the rest of the kernel needs of a processor is here.
+// A vector V of LANES numbers and a mask of lanes: for AVX-512, for AVX2, for any other processor with the compiler's
+// vector extensions, and for one lane as plain numbers. All processor-specific code is here and in tables.h.
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
@@ -33,7 +33,7 @@ MERGED V v_floor(V x) { return _mm512_roundscale_pd(x, _MM_FROUND_TO_NEG_INF | _
 MERGED V v_ceil(V x) { return _mm512_roundscale_pd(x, _MM_FROUND_TO_POS_INF | _MM_FROUND_NO_EXC); }
 MERGED V v_nearest(V x) { return _mm512_roundscale_pd(x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
 MERGED V v_fabs(V x) { return _mm512_abs_pd(x); }
-MERGED V v_max(V a, V b) { return _mm512_max_pd(b, a); } // of NaN and a number the first, as Python has it
+MERGED V v_max(V a, V b) { return _mm512_max_pd(b, a); } // if either is NaN, the first argument, as in Python
 MERGED V v_min(V a, V b) { return _mm512_min_pd(b, a); }
 MERGED V v_scaled(V x, V power) { return _mm512_scalef_pd(x, power); }
 
@@ -96,7 +96,7 @@ MERGED V v_max(V a, V b) { return b > a ? b : a; }
 MERGED V v_min(V a, V b) { return b < a ? b : a; }
 #define POWER_BY_BITS
 
-#else // the compiler makes of it what the processor has
+#else // the compiler maps these vectors to the processor's
 typedef double V __attribute__((vector_size(8 * LANES)));
 typedef int64_t Mask __attribute__((vector_size(8 * LANES)));
 typedef Mask Bits;
@@ -160,7 +160,7 @@ MERGED double max_f(double a, double b) { return b > a ? b : a; }
 MERGED double min_f(double a, double b) { return b < a ? b : a; }
 
 #ifdef POWER_BY_BITS
-// x 2^power for whole powers from -1022 to 1023
+// x 2^power for integer powers from -1022 to 1023
 MERGED V v_scaled(V x, V power) {
     V shifted = power + splat(0x1.8p52 + 1023.0);
     Bits bits;
@@ -171,7 +171,7 @@ MERGED V v_scaled(V x, V power) {
 }
 #endif
 
-// e^x within an ulp: Taylor's series for what is left of x beyond a multiple of ln 2 (at most 0.347), by Estrin.
+// e^x to within one ulp: x is reduced by a multiple of ln 2 to at most 0.347, then a Taylor series by Estrin's scheme.
 MERGED V v_exp(V x) {
     const V bounded = v_min(v_max(x, splat(-708.0)), splat(709.0));
     const V n = v_nearest(bounded * splat(0x1.71547652b82fep0));
@@ -193,7 +193,7 @@ MERGED V v_exp(V x) {
     return sel(ne(x, x), x, grown);
 }
 
-// The rest is rare: glibc's vector functions where there are some, otherwise one lane after the other.
+// These functions are rarely used: glibc's vector versions where available, otherwise one lane at a time.
 #if defined(__x86_64__) && defined(__GLIBC__) && LANES == 8 && defined(__AVX512F__)
 #define FROM_GLIBC(name) _ZGVeN8v_##name
 #define FROM_GLIBC_2(name) _ZGVeN8vv_##name

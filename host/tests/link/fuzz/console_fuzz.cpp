@@ -1,4 +1,4 @@
-// Any lines on the console: every one is answered exactly once, and the parameters stay within their ranges.
+// Arbitrary lines on the console: each is answered exactly once.
 #include <stdlib.h>
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 #include "board_harness.cpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  // Not 0x00: frames would swallow lines. Not echo: it repeats what may look like an answer; so no backspaces either,
-  // with which the word could be made.
+  // No 0x00: frames would swallow lines. No `echo`: it repeats input that may look like an answer. No backspaces, with
+  // which the word could be edited into a line.
   std::string input;
   for (size_t i = 0; i < size; ++i) {
     if (data[i] != 0 && data[i] != 0x08 && data[i] != 0x7F) input.push_back(static_cast<char>(data[i]));
@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     ++lines;
     board_run(&board, 4000, 0);
     text.assign(board.output.begin(), board.output.end());
-    // What adds lines by itself has been switched on.
+    // A command has switched on output that adds lines of its own.
     if (text.find("[>") != std::string::npos || text.find("_psi:") != std::string::npos) return 0;
   }
   board_run(&board, 4000, 0);

@@ -1,4 +1,4 @@
-// Any bytes in the EEPROM at start: the parameters are within their ranges, and a save works afterwards.
+// Arbitrary EEPROM contents at start: loaded parameters are within their ranges, and a save works afterwards.
 #include <stdlib.h>
 
 #include "board_harness.cpp"
@@ -8,7 +8,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   Board board;
   uint8_t* cells = board.cells;
   memcpy(cells, data, size < sizeof board.cells ? size : sizeof board.cells);
-  // Half of the records get a right CRC, so that what comes after it is tried as well.
+  // Half of the records get a correct CRC, so that the checks after it are exercised as well.
   for (uint8_t slot = 0; slot < bifa::kSlotCount; ++slot) {
     uint8_t* record = cells + bifa::slot_address(slot);
     if (record[0] % 2 == 0) continue;
@@ -37,7 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const char name[bifa::kNameSize + 1] = "fuzz";
   bifa::ParameterSet set = bifa::factory_preset(1);
   set.period_us = 1234567;
-  if (store.save(name, set) != bifa::Result::kOk) return 0;  // no room: presets, or records of a later firmware
+  if (store.save(name, set) != bifa::Result::kOk) return 0;  // no room: presets, or a later firmware's records
   poll();
   if (store.busy()) abort();
   if (store.result() != bifa::Result::kOk) return 0;

@@ -1,5 +1,5 @@
-// Any bytes into the receive interrupt, with any pauses: nothing is read or written beyond its place, a walking robot
-// is stopped by `!` and never by anything else, and after a pause the Uno answers as ever.
+// Arbitrary bytes into the receive interrupt, with arbitrary pauses: no access is out of bounds (the sanitizers watch),
+// and after a pause the Uno answers as usual.
 #include <stdlib.h>
 
 #include <string>
@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   board_run(&board, 30 + size / kBytesPerMs, 0);
   board_send(&board, &end, 1);
   board_run(&board, 5, 0);
-  // Saves among the bytes keep it busy for 0.3 s each; a line that comes meanwhile may be answered as damaged.
+  // Saves among the bytes keep the Uno busy for 0.3 s each; a line received meanwhile may be answered as damaged.
   for (int patience = 0; patience < 10; ++patience) {
     board.output.clear();
     board_send(&board, question, sizeof question - 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives every entry point of plant.h, foreign.h and uno.h once or more, for AddressSanitizer and UBSan to watch.
+// Calls every entry point of plant.h, foreign.h and uno.h at least once, under AddressSanitizer and UBSan.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 
 #include "foreign.h"
 #include "plant.h"
-#include "robots.h"  // constants that the test writes: PLANT with its springs, FOREIGN
+#include "robots.h"  // constants written by the test: PLANT with its springs, FOREIGN
 #include "uno.h"
 
 enum { ROWS = 800 };

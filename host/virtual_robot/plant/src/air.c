@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Supplies, valves, tubes, chambers and pressure sensors: eqs. (2) and (3) and everything that may disturb them.
+// Supplies, valves, tubes, chambers and pressure sensors: eqs. (2) and (3), and the effects that modify them.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,7 +30,7 @@ static double valve_delay(const PlantParameters *p, int state) {
   return p->valve_latency_delay_s + (edge > 0 ? edge : 0) + own;
 }
 
-// An edge that a later command overtakes never happens.
+// Drops pending edges that a newer command supersedes.
 static void forget_overtaken(SwitchingQueue *edges, const Switching *newer) {
   int kept = 0;
   Switching *items = edges->items + edges->first;
@@ -105,7 +105,7 @@ static double alpha_per_s(const Plant *plant, const double *y, int chamber, doub
   return bulged ? p->body_alpha_s_per_s : p->body_alpha_n_per_s;
 }
 
-// Share of the body's volume that a chamber takes up: three actuators at an end of the robot, one on the stand.
+// Volume of a chamber relative to the body's: three actuators at an end of the robot, one on the stand.
 static double volume_share(const Plant *plant, int chamber) {
   if (chamber == BODY) return 1.0;
   double count = plant->experiment == STEP_RESPONSE || plant->experiment == STATIC_LOADING ? 1.0 : SMALL_PER_END;
@@ -114,7 +114,7 @@ static double volume_share(const Plant *plant, int chamber) {
          (plant->p.body_area_N_psi * (body->extended - body->contracted));
 }
 
-// A source with inner resistance gives way to what its chambers draw.
+// The pressure of a source with internal resistance drops with the flow that its chambers draw.
 double supply_psi(const Plant *plant, double time, const double *y, int source) {
   double pressure = unloaded_psi(plant, time, y, source);
   double resistance = plant->p.supply_sag_resistance_s;
@@ -132,10 +132,10 @@ double supply_psi(const Plant *plant, double time, const double *y, int source) 
 
 // --- chambers ---------------------------------------------------------------------------------------------------
 
-// ISO 6358: flow through a restriction, in psi of difference that a linear law would need for it. The conductance
-// is such that the paper's baseline gait keeps its speed.
+// Flow through a restriction by ISO 6358, as the pressure difference in psi at which a linear law gives the same flow.
+// The conductance is chosen so that the paper's baseline gait keeps its speed.
 #define CONDUCTANCE 1.05
-#define LAMINAR_RATIO 0.999  // closer to equality the flow is laminar: no infinite slope there
+#define LAMINAR_RATIO 0.999  // above this ratio the flow is laminar, which avoids an infinite slope
 
 static double throttled(double inlet, double pressure, double critical_ratio) {
   double up = fmax(inlet, pressure) + SURROUNDINGS_PSI, down = fmax(fmin(inlet, pressure) + SURROUNDINGS_PSI, 0.0);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Dry friction of the two halves on the pipe, eqs. (5)-(7), as true set-valued Coulomb friction: a half either
-// sticks, and friction is what it must be, or slides, and friction opposes it. integrate() finds the moments of
-// change, so no threshold speed is needed.
+// sticks (friction balances the pull) or slides (friction opposes the motion). integrate() locates the transitions,
+// so no threshold speed is needed.
 #include <math.h>
 
 #include "parts.h"
 
 static double pipe_angle(const Plant *plant) {
-  if (plant->experiment != LOCOMOTION) return 0.0;  // only the walks' pipe is tilted
+  if (plant->experiment != LOCOMOTION) return 0.0;  // only the pipe of walking experiments is tilted
   return (plant->p.inclination_deg + plant->p.inclination_angle_deg) * M_PI / 180.0;
 }
 
@@ -22,7 +22,7 @@ double normal_force(const Plant *plant, const double *y, int end) {
   return SMALL_PER_END * wall_force(plant, y, end) + weight;
 }
 
-// Lips at the joints of the pipe's segments raise the friction over a short way.
+// Lips at the joints of the pipe's segments raise the friction over a short distance.
 static double joint_factor(const PlantParameters *p, double x) {
   if (p->pipe_joint_rise <= 0) return 1.0;
   double from_joint = remainder(x - 0.5 * p->pipe_joint_spacing_m, p->pipe_joint_spacing_m) / p->pipe_joint_width_m;
@@ -57,7 +57,7 @@ double kinetic_grip(const Plant *plant, const double *y, int end, double directi
   return grip(plant, y, end, direction, coefficient);
 }
 
-// Eq. (6) with the weight's part along the pipe.
+// Eq. (6) with the component of the weight along the pipe.
 double pull_without_friction(const Plant *plant, const double *y, int end) {
   double push = internal_force(plant, y, BODY);
   double angle = pipe_angle(plant);

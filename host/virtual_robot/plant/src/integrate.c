@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Classical Runge-Kutta steps, cut at every moment at which the equations change: a half stops or breaks away, an
-// actuator meets or leaves the wall, a stroke passes the point where the pouch bulges.
+// Classical Runge-Kutta steps, split wherever the equations change: a half stops or breaks away, an actuator meets or
+// leaves the wall, a stroke passes the point where the pouch bulges.
 #include <math.h>
 #include <string.h>
 
@@ -30,7 +30,7 @@ static void runge_kutta(const Plant *plant, double h, double *next) {
   for (int i = 0; i < STATES; i++) next[i] = y[i] + h / 6.0 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
 }
 
-// Sliding: speed in the direction of sliding. Sticking: how much more the grip could hold.
+// Sliding: speed in the direction of sliding. Sticking: static friction left before the half breaks away.
 static double hold_margin(const Plant *plant, const double *y, int end) {
   Slide slide = plant->slide[end];
   if (slide != STICK) return slide * y[end ? V_TAIL : V_HEAD];
@@ -51,7 +51,7 @@ static void event_values(const Plant *plant, const double *y, double *g) {
   }
 }
 
-// A half that stops stays, unless what pulls at it is more than the grip can hold.
+// A half that stops sticks, unless the pull exceeds its static friction.
 static void stop_or_break_away(Plant *plant, int end) {
   int v = end ? V_TAIL : V_HEAD;
   plant->y[v] = 0.0;
@@ -112,7 +112,7 @@ static void step(Plant *plant, double h) {
   }
 }
 
-// The testing machine decides where the end is.
+// The testing machine prescribes the position of the actuator's end.
 static void follow_crosshead(Plant *plant) {
   if (plant->experiment != STATIC_LOADING) return;
   double rate;
@@ -158,6 +158,6 @@ void integrate(Plant *plant, double duration) {
     }
     plant->time = until;
   }
-  plant->time = end;  // a valve that switches now is not seen yet
+  plant->time = end;  // a valve that switches at this instant takes effect in the next call
   follow_crosshead(plant);
 }

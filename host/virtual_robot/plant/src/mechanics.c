@@ -23,7 +23,7 @@ double crosshead_m(const Plant *plant, double time, double *rate) {
   return position;
 }
 
-// The next moment at which the cross-head's speed jumps.
+// Next time at which the cross-head's speed jumps; infinite if there is none.
 double next_turn(const Plant *plant) {
   const Crosshead *c = &plant->crosshead;
   if (c->rate <= 0) return INFINITY;
@@ -35,7 +35,7 @@ double next_turn(const Plant *plant) {
   return INFINITY;
 }
 
-// How far an actuator is extended; the body's is the distance of the two halves.
+// Extension of an actuator; the body's is the distance between the two halves.
 double stroke_m(const double *y, int chamber, double *rate) {
   if (chamber == BODY) {
     if (rate) *rate = y[V_HEAD] - y[V_TAIL];
@@ -65,7 +65,7 @@ static double spring_position(const Plant *plant, int chamber, double x) {
   return fmin(fmax(plant->play[chamber], x - half), x + half);
 }
 
-// -K - b v + a p of an actuator: what pushes its ends apart.
+// The force that pushes an actuator's ends apart: -K - b v + a p.
 double internal_force(const Plant *plant, const double *y, int chamber) {
   const PlantParameters *p = &plant->p;
   bool small = chamber != BODY;
@@ -83,7 +83,7 @@ double internal_force(const Plant *plant, const double *y, int chamber) {
   return force;
 }
 
-// Eq. (8), pushing only; there is no wall around an actuator on the test stand.
+// Eq. (8), except that the wall never pulls. An actuator on the test stand has no wall around it.
 double wall_force(const Plant *plant, const double *y, int end) {
   const PlantParameters *p = &plant->p;
   if (plant->experiment == STEP_RESPONSE || plant->experiment == STATIC_LOADING) return 0.0;
@@ -121,7 +121,7 @@ static void half_derivative(const Plant *plant, const double *y, double *dy, int
   dy[v] = (pull - slide * grip) / (end ? plant->p.tail_mass_kg : plant->p.head_mass_kg);
 }
 
-// The camera's marker stands on a springy mount that rings with the head's acceleration.
+// The camera's marker sits on a springy mount, which rings when the head accelerates.
 static void mount_derivative(const Plant *plant, const double *y, double *dy) {
   const PlantParameters *p = &plant->p;
   if (p->mount_resonance_share <= 0) return;

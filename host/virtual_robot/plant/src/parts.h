@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the parts of the plant share among themselves.
+// Declarations shared by the parts of the plant.
 #ifndef VIRTUAL_ROBOT_PARTS_H
 #define VIRTUAL_ROBOT_PARTS_H
 
@@ -12,7 +12,7 @@
 #define SMALL_PER_END 3.0  // eq. (7): three small actuators at each end
 #define MAX_SPRING 256
 
-// Continuous state. One block of each kind per chamber; the body's x and v are those of head and tail.
+// Continuous state. Blocks have one entry per chamber, except that the body's x and v are those of head and tail.
 enum {
   X_HEAD,
   V_HEAD,
@@ -60,8 +60,8 @@ struct Plant {
   int experiment, chamber;
   double time, step;
   double y[STATES];
-  double play[CHAMBERS];  // where the spring is within the backlash
-  int source[CHAMBERS];   // what the valves connect now
+  double play[CHAMBERS];  // position of the spring within the backlash
+  int source[CHAMBERS];   // what each chamber is connected to
   double set_point_psi;
   SwitchingQueue commands, edges;
   Slide slide[2];  // head, tail

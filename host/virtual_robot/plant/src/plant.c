@@ -8,7 +8,7 @@
 
 #define SETTLE_S 10.0       // twenty times the chambers' time constant
 #define STEP_S 1e-4         // the small actuators' fastest rate is 2.4e3 1/s
-#define STATIC_STEP_S 2e-3  // only air moves by itself
+#define STATIC_STEP_S 2e-3  // only the air has dynamics of its own
 
 Plant *plant_new(const PlantParameters *parameters, const double *body_force_N, int body_count, double body_first_m,
                  double body_step_m, const double *small_force_N, int small_count, double small_first_m,
@@ -39,13 +39,13 @@ void plant_landmarks(const Plant *plant, int small, double *contracted_m, double
   *extended_m = plant->spring[small].extended;
 }
 
-// Vented and still; then `start` is connected, and integrating shows where that leads.
+// Vented and at rest, with `start` just connected; integration then lets the robot settle.
 static void put_at_rest(Plant *plant, int start) {
   memset(plant->y, 0, sizeof plant->y);
   double *y = plant->y;
   y[X_HEAD] = plant->spring[0].contracted;
   y[X_SMALL] = y[X_SMALL + 1] = plant->spring[1].contracted;
-  if (plant->experiment == ANCHOR_PULL) y[X_SMALL] = plant->p.wall_offset_m;  // extended by pressure before
+  if (plant->experiment == ANCHOR_PULL) y[X_SMALL] = plant->p.wall_offset_m;  // already extended by pressure
   y[REGULATED] = plant->set_point_psi;
   for (int chamber = 0; chamber < CHAMBERS; chamber++) {
     plant->source[chamber] = VENT;
@@ -68,7 +68,7 @@ void plant_mount(Plant *plant, int experiment, int chamber, int start) {
   plant->time = -SETTLE_S;
   integrate(plant, SETTLE_S);
   plant->time = 0;
-  for (int c = 0; c < CHAMBERS; c++) plant->y[RELAXING + c] = 0;  // it has rested long before
+  for (int c = 0; c < CHAMBERS; c++) plant->y[RELAXING + c] = 0;  // relaxed after a long rest
   plant->origin_head = plant->y[X_HEAD];
   plant->origin_tail = plant->y[X_TAIL];
 }

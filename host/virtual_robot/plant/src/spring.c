@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bistable spring as a table with a cubic spline through it (parabolic run-out), straight beyond its ends.
+// The bistable spring as a table with a cubic spline through it (parabolic run-out), extrapolated linearly.
 #include <math.h>
 #include <string.h>
 
@@ -18,7 +18,7 @@ static double root_between(const Spring *spring, double low, double high) {
   return 0.5 * (low + high);
 }
 
-// The three equilibria: force rises through zero at the stable ones and falls through it in between.
+// The three equilibria: the force rises through zero at the stable ones and falls through it at the unstable one.
 static void find_landmarks(Spring *spring) {
   int found = 0;
   double root[3] = {0};
@@ -77,7 +77,7 @@ double spring_force(const Spring *spring, double x) {
 }
 
 double spring_energy(const Spring *spring, double x) {
-  const int panels = 400;  // Simpson from the contracted state
+  const int panels = 400;  // Simpson's rule from the contracted state
   double from = spring->contracted, h = (x - from) / panels;
   double sum = spring_force(spring, from) + spring_force(spring, x);
   for (int i = 1; i < panels; i++) sum += (i % 2 ? 4.0 : 2.0) * spring_force(spring, from + i * h);

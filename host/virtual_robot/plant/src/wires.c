@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cables between Uno and plant: valve pins, sampling strobe, pressure sensors, DAC and regulator monitor, and
-// the instruments that watch meanwhile.
+// The cables between Uno and plant: valve pins, sampling strobe, pressure sensors, DAC and regulator monitor; also the
+// instruments that record at the same time.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,7 +19,7 @@ typedef struct Wires {
   double spare_gauss;
   bool has_spare;
   double noise_psi, noise_memory_s;
-  double noise[CHAMBERS], noise_time[CHAMBERS];  // of unit size, and when it was that
+  double noise[CHAMBERS], noise_time[CHAMBERS];  // unit variance; time of the last draw
   double broken_volts[4];
   bool energised[CHAMBERS][2];  // positive, vacuum valve
   int both;
@@ -64,7 +64,7 @@ void plant_wire(Plant *plant, uint64_t start_cycle, double clock_hz, uint64_t no
   plant->wires = wires;
 }
 
-// With both valves energised supply and vacuum are short-circuited; the chamber is taken as vented and it is counted.
+// Both valves at once connect supply and vacuum; the chamber then counts as vented (pin_changed() counts these cases).
 static int connected(const bool *energised) {
   if (energised[0] == energised[1]) return VENT;
   return energised[0] ? POSITIVE : VACUUM;
@@ -112,7 +112,7 @@ static void pin_changed(void *context, uint64_t cycle, int pin, int level) {
   plant_connect(plant, fmax(time, plant->time), chamber, connected(energised));
 }
 
-// An Ornstein-Uhlenbeck process, sampled when the converter asks.
+// An Ornstein-Uhlenbeck process, sampled whenever the converter samples.
 static double sensor_noise(Wires *wires, int chamber, double time) {
   double kept = 0;
   if (wires->noise_memory_s > 0) kept = exp(-fabs(time - wires->noise_time[chamber]) / wires->noise_memory_s);

@@ -3,7 +3,7 @@
 
     python -m virtual_robot.sealed --truth foreign --seed 7 --out runs/seven [--kind one|none|pair|outside]
 
-Written from the literature (docs/truths.md), before the engine that is tried on it was changed, and frozen.
+Written from the literature (docs/truths.md) before the engine under test was changed, and frozen since.
 """
 
 from virtual_robot.truths.foreign.day import Label, generate

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bench around the foreign robot: valves' edges, instruments, and what may be wrong with them."""
+"""The bench around the foreign robot: valve switching, instruments, and their possible faults."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class Instruments:
-    """Noise and clocks, one set for the day."""
+    """Noise and clock errors, drawn once for the day."""
 
     camera_mm: float
     wander_mm: float
-    wander_share: float  # of trials that have any
+    wander_share: float  # share of trials that have it
     force_N: float
     force_correlation: float
     pressure_psi: float
@@ -65,7 +65,7 @@ class Instruments:
 
 @dataclass(frozen=True)
 class Bench:
-    """`robot`: fields of ForeignRobot; `faults`: what the effects change of the bench."""
+    """`robot`: fields of ForeignRobot; `faults`: changes that the effects make to the bench."""
 
     robot: Mapping[str, Any]
     instruments: Instruments
@@ -74,7 +74,7 @@ class Bench:
     def record(
         self, plan: Plan, session_share: float, crept_m: Sequence[float], random: np.random.Generator
     ) -> tuple[dict[str, np.ndarray], tuple[float, float]]:
-        """The trial's columns as in the contract, and how far the pouches have crept by its end."""
+        """Run a trial; return its columns as in the contract, and how far the pouches have crept by its end."""
         times, commands, own = self._schedule(plan, random)
         true_s = self._true_times(times, random)
         late = self.faults.get("late", {"s": 0.0, "marker": "head"})
@@ -103,7 +103,7 @@ class Bench:
             return [(_STEP_UP_S, plan.chamber, "positive"), (_STEP_DOWN_S, plan.chamber, "vacuum")]
         return []
 
-    # --- what is done ---------------------------------------------------------------------------------------------
+    # --- the experiment -------------------------------------------------------------------------------------------
 
     def travel_m(self, plan: Plan) -> float:
         if plan.experiment == "anchor_pull":
@@ -112,7 +112,7 @@ class Bench:
         return float(np.round(spring["extended_m"] * 1e3, 1) * 1e-3)
 
     def _schedule(self, plan: Plan, random: np.random.Generator) -> tuple[np.ndarray, list[Any], dict[str, Any]]:
-        """Nominal sample times, commands, and what is this trial's own."""
+        """Nominal sample times, commands, and the robot's fields that vary from trial to trial."""
         own: dict[str, Any] = {
             "friction_factor": float(1.0 + self.instruments.friction_wobble * random.standard_normal()),
             "hunt_phase": float(random.uniform()),
@@ -149,7 +149,7 @@ class Bench:
         }
 
     def _edges(self, commands: list[tuple[float, str, str]], random: np.random.Generator) -> list[Edge]:
-        """When valves really switch; an edge that a later command overtakes never happens."""
+        """When the valves actually switch; an edge overtaken by a later command never happens."""
         delays = self.faults.get("delay_s", [[0.0, 0.0]] * 3)
         jitter = self.faults.get("delay_jitter_s", 0.0)
         edges: list[Edge] = []
@@ -165,7 +165,7 @@ class Bench:
         jitter[0] = abs(jitter[0])
         return np.maximum(times / (1.0 + self.instruments.drift) + jitter, 0.0)
 
-    # --- what is seen ---------------------------------------------------------------------------------------------
+    # --- the instruments ------------------------------------------------------------------------------------------
 
     def _displacements(
         self,
@@ -199,7 +199,7 @@ class Bench:
         return noise + (slow - slow[0] if random.uniform() < i.wander_share else 0.0)
 
     def _ringing(self, true_s: np.ndarray, commands: list[Any]) -> np.ndarray:
-        """The camera's mount, kicked by every valve that switches."""
+        """Motion of the camera's mount, which every switching valve excites."""
         ring = self.faults.get("camera_ring")
         moved = np.zeros(len(true_s))
         if ring is None:
@@ -250,7 +250,7 @@ class Bench:
 
 
 def _play(moved: np.ndarray, width: float) -> np.ndarray:
-    """The play operator: a loose marker is taken along only at either end of its play."""
+    """The play operator: a loose marker is dragged along only at either end of its play."""
     if width <= 0:
         return moved
     seen, at = np.empty_like(moved), float(moved[0])
@@ -261,19 +261,19 @@ def _play(moved: np.ndarray, width: float) -> np.ndarray:
 
 
 def _drift_psi(drift: Mapping[str, float], session_share: float) -> float:
-    """The sensors' temperature follows the hall's over the day."""
+    """Offset of sensors whose temperature follows the hall's over the day."""
     return drift["psi"] * float(np.sin(2.0 * np.pi * (drift["turns"] * session_share + drift["phase"])))
 
 
 def _guide_and_screw(crosshead_m: np.ndarray, machine: Mapping[str, float]) -> np.ndarray:
-    """The testing machine's guides rub, its screw's force has the period of its lead."""
+    """Force errors of the testing machine: friction of its guides, and a ripple with the period of its screw's lead."""
     towards = np.sign(np.gradient(crosshead_m))
     screw = machine["screw_N"] * np.sin(2.0 * np.pi * (crosshead_m / machine["lead_m"] + machine["phase"]))
     return machine["N"] * towards + screw
 
 
 def _lagging(target: np.ndarray, times: np.ndarray, time_s: float) -> np.ndarray:
-    """First-order lag behind `target`, settled on its first value at the start."""
+    """First-order lag behind `target`, starting from its first value."""
     lagging = np.empty_like(target)
     lagging[0] = target[0]
     for k in range(1, len(target)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A day in the foreign lab: which trials, in which order, with what in them; the data set and its seal."""
+"""A day in the foreign lab: its trials, their order and the effects in them; the data set and its seal."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class DayError(VirtualRobotError):
 
 @dataclass(frozen=True)
 class Label:
-    """What is in a data set. `effects`: name -> {"form", "size"} and every number that it changed."""
+    """The truth of a data set. `effects`: name -> {"form", "size"} and every number that the effect changed."""
 
     seed: int
     kind: str
@@ -55,7 +55,7 @@ class Label:
 
 
 def _flat(numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """Lists and tables as `name_1`, `name_key`: the seal is a table of plain values."""
+    """Flatten lists and tables to `name_1`, `name_key`: the seal holds plain values only."""
     flat: dict[str, Any] = {}
     for name, value in numbers.items():
         if isinstance(value, Mapping):
@@ -68,7 +68,7 @@ def _flat(numbers: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plans(random: np.random.Generator) -> list[Plan]:
-    """The day's 16 conditions; pressures, rates and gaits are the seed's."""
+    """The day's 16 conditions; pressures, rates and gaits are drawn."""
     middle, high = float(random.choice((4.0, 4.5, 5.0))), float(random.choice((8.0, 8.5)))
     slow, fast = float(random.choice((2.0, 2.5))), float(random.choice((8.0, 10.0)))
     static = [
@@ -108,7 +108,7 @@ def draw_names(kind: str, random: np.random.Generator) -> list[str]:
 def draw_effects(
     kind: str, random: np.random.Generator, effect: str | None, size: float | None, form: str | None
 ) -> tuple[dict[str, dict[str, Any]], Change]:
-    """(label's table of effects, all that they change)."""
+    """Return the label's table of effects, and all changes that they make."""
     names = draw_names(kind, random)
     span = PAIR_SIZES if kind == "pair" else SIZES
     sizes = [float(random.uniform(*span)) for _ in range(2)]
@@ -117,7 +117,7 @@ def draw_effects(
             raise NoEffectError(f"no effect {effect!r}; there are {', '.join(EFFECTS)}")
         names = [effect]
     elif form is not None:
-        raise DayError("a form is that of an effect: name the effect, too")
+        raise DayError("a form without an effect: name the effect, too")
     label: dict[str, Any] = {}
     robot: dict[str, Any] = {}
     bench: dict[str, Any] = {}
@@ -131,7 +131,7 @@ def draw_effects(
 
 
 def _combined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
-    """Delays of two effects add up; jitters as if independent."""
+    """Combine the faults of two effects: delays add up, jitters add as if independent."""
     both = dict(second)
     if "delay_s" in first and "delay_s" in second:
         sums = np.array(first["delay_s"]) + np.array(second["delay_s"])
@@ -142,7 +142,7 @@ def _combined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, 
 
 @dataclass(frozen=True)
 class Day:
-    """Everything that a seed decides, before any trial is run."""
+    """Everything that a seed determines, before any trial is run."""
 
     label: Label
     bench: Bench
@@ -174,7 +174,7 @@ class Day:
         return cls(label, Bench(robot | dict(change.robot), instruments, change.bench), jobs, order)
 
     def run(self, wanted: set[int] | None = None) -> dict[int, dict[str, np.ndarray]]:
-        """Columns by job, run one after the other as the day went: what creeps stays crept."""
+        """Columns by job, run in the order of the day, since creep carries over from trial to trial."""
         columns, crept = {}, (0.0, 0.0)
         for place, job in enumerate(self.order):
             if wanted is not None and job not in wanted:
@@ -201,7 +201,7 @@ class Day:
         return entry | {"repeat": repeat, "session_order": self.order.index(job) + 1}
 
     def known(self) -> dict[str, float]:
-        """What a lab weighs and reads off: to the gram and to a hundredth of a psi."""
+        """What a lab measures directly: masses to the gram, supplies to a hundredth of a psi."""
         robot = self.label.robot
         return {
             "head_mass_kg": round(robot["half_mass_kg"][0], 3),
@@ -222,7 +222,7 @@ def generate(
 ) -> Label:
     """Write the data set `out` and its seal (default: OUT.sealed.toml beside it); both complete or not at all.
 
-    `effect`, `size` (a factor of its modest size) and `form` fix what would be drawn. Raises VirtualRobotError.
+    `effect`, `size` (a factor of its modest size) and `form` replace what would be drawn. Raises VirtualRobotError.
     """
     out = Path(out)
     if out.exists():

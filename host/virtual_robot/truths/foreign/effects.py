@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every effect in forms of its own: what each changes of the robot (fields of ForeignRobot) and of the bench.
+"""The foreign effects: what each form changes in the robot (fields of ForeignRobot) and in the bench.
 
-An effect has one or more published forms; the seed draws one, and its further numbers. `size` is the factor of what
+An effect has one or more published forms; the seed draws one, and its other numbers. `size` is the factor of what
 the lab notes (section 9) call modest. Sources: docs/truths.md.
 """
 
@@ -25,7 +25,7 @@ class NoEffectError(VirtualRobotError):
 
 @dataclass(frozen=True)
 class Change:
-    """What an effect does: fields of ForeignRobot, and settings of the bench (bench.py)."""
+    """What an effect changes: fields of ForeignRobot, and faults of the bench (bench.py)."""
 
     robot: Mapping[str, Any] = field(default_factory=dict)
     bench: Mapping[str, Any] = field(default_factory=dict)
@@ -42,7 +42,7 @@ class Effect:
     remembers: bool = False
 
     def draw(self, size: float, random: np.random.Generator, form: str | None = None) -> tuple[str, Change]:
-        """A form, drawn unless given, and what it changes."""
+        """Return the name of a form, drawn unless given, and what it changes."""
         drawn = str(random.choice(sorted(self.forms)))
         if form is not None and form not in self.forms:
             raise NoEffectError(f"{self.name} has no form {form!r}; there are {', '.join(self.forms)}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A specimen: another robot of the same design, and a bench whose constants nobody has told."""
+"""A specimen: another robot of the same design, and a bench with undisclosed constants."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from virtual_robot.errors import VirtualRobotError
 
-# Body, small actuator: stroke between the stable states [m], peaks of the spring [N], and what its stops hold how far
-# beyond the stable states: there full vacuum and full pressure leave it (lab notes, section 6).
+# For body and small actuator: stroke between the stable states [m], peaks of the spring [N], and (distance beyond the
+# stable state [m], force of the stop there [N]) where full vacuum and full pressure hold it (lab notes, section 6).
 _STROKE_M = (0.0537, 0.0300)
 _PEAKS_N = ((32.0, 40.0), (7.0, 9.0))
 _BEYOND = (((0.0053, 117.0), (0.0042, 76.5)), ((0.0034, 41.6), (0.0033, 27.2)))
@@ -46,10 +46,10 @@ def build_spring(
     slenderness: float,
     stops_m: tuple[float, float],
 ) -> Spring:
-    """The truss with this stroke, these peaks, and (distance [m], force [N]) beyond either stable state.
+    """Build the truss with this stroke, these peaks, and (distance [m], force [N]) beyond either stable state.
 
-    `slenderness`: half span over rise; `stops_m`: lengths over which the stops grow e-fold. Newton's method for
-    five unknowns, damped.
+    `slenderness`: half span over rise; `stops_m`: lengths over which the stops grow e-fold. Damped Newton's
+    method in five unknowns. Raises NoSpringError.
     """
 
     def spring(u: np.ndarray) -> Spring:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One trial of the C robot: its numbers in, a record of every channel out."""
+"""One trial of the C robot: parameters in, a record of every channel out."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class StuckError(VirtualRobotError):
 
 @dataclass(frozen=True)
 class Edge:
-    """A valve really switches."""
+    """A moment at which a chamber's valves actually switch."""
 
     time_s: float
     chamber: str
@@ -49,7 +49,7 @@ class Edge:
 
 @dataclass(frozen=True)
 class Run:
-    """`rows` of dtype SAMPLE; `crept_m` of body and small actuators by the end; `steps` that were tried."""
+    """`rows` of dtype SAMPLE; `crept_m`: creep of body and small actuators by the end; `steps` attempted."""
 
     rows: np.ndarray
     crept_m: tuple[float, float]
@@ -100,7 +100,7 @@ def run(robot: Mapping[str, Any], trial: Mapping[str, Any], edges: Sequence[Edge
 
 
 def c_robot(robot: Mapping[str, Any]) -> Any:
-    """The C struct of `robot`; an unknown field is a KeyError of cffi."""
+    """The C struct of `robot`; cffi raises KeyError for an unknown field."""
     _check_built()
     return ffi.new("ForeignRobot *", dict(robot))
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ADC (datasheet section 23): the channel is latched at the start and held 1.5 ADC clocks later, ADIF is
-// cleared by writing one, ADCL locks the result. Replaces libsimavr's model (reads the multiplexer too late).
+// cleared by writing one, ADCL locks the result. Replaces libsimavr's model, which reads the
+// multiplexer too late.
 #include "board.h"
 
 enum { ADEN = 0x80, ADSC = 0x40, ADATE = 0x20, ADIF = 0x10, ADIE = 0x08 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the parts of the simulated board share among themselves.
+// Declarations shared by the parts of the simulated board.
 #ifndef VIRTUAL_ROBOT_BOARD_H
 #define VIRTUAL_ROBOT_BOARD_H
 
@@ -77,7 +77,7 @@ typedef struct WrappedWrite {  // libsimavr's own handler behind ours
 
 typedef struct Compare {
   WrappedWrite behind;
-  bool level;  // of OC1B, whether it is on the pin or not
+  bool level;  // OC1B, whether or not it drives the pin
 } Compare;
 
 typedef struct Usart {
@@ -132,7 +132,7 @@ typedef struct Eeprom {
 
 struct Uno {
   avr_t *avr;
-  avr_io_t after_reset;  // last in libsimavr's list: puts right what its reset leaves wrong
+  avr_io_t after_reset;  // last in libsimavr's list: corrects what its reset leaves wrong
   UnoWorld world;
   avr_int_vector_t *vector[VECTOR_COUNT];
   uint64_t until_cycle;
@@ -142,7 +142,7 @@ struct Uno {
   uint8_t mcusr;
   bool optiboot;
   bool hung;
-  uint16_t hung_instruction;  // what stood where it hangs
+  uint16_t hung_instruction;  // the instruction that the hang replaces
   uint32_t hung_at;
   uint32_t resets;
   int reset_cause, last_reset_cause;

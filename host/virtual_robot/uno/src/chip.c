@@ -12,7 +12,7 @@
 #include "sim_hex.h"
 
 #define INTERRUPT_ENTRY_CYCLES 4  // datasheet 7.7.1; libsimavr charges none
-#define WAKE_UP_CYCLES 4          // and four more out of sleep
+#define WAKE_UP_CYCLES 4          // added when waking from sleep
 #define RAM_START 0x100
 #define RAM_END 0x8FF
 #define RAM_PAINT 0xA5
@@ -31,7 +31,8 @@ static uint64_t cycles_left(const Uno *uno) {
   return uno->until_cycle > uno->avr->cycle ? uno->until_cycle - uno->avr->cycle : 0;
 }
 
-// Replaces avr_callback_run_raw: sleeps in virtual time, ends with the slice, charges interrupt entry.
+// Replaces avr_callback_run_raw: sleeps in virtual time, stops at the end of the slice, counts the cycles of interrupt
+// entry.
 static void run_slice(avr_t *avr) {
   Uno *uno = board_of(avr);
   avr_flashaddr_t next_pc = avr->pc;
@@ -66,10 +67,10 @@ static void never_sleep(avr_t *avr, avr_cycle_count_t how_long) {
   (void)how_long;
 }
 
-// What Optiboot 4.4, which Unos are sold with, leaves behind of a reset, read off its listing: it clears MCUSR. After an
-// external reset it waits for a program, with constants in r8 to r11 and an address in r12 and r13, then ends itself by a
-// watchdog reset, which leaves those alone; after any other one (its own included) it calls, two deep, what switches the
-// watchdog off, and jumps to the program. uno_hold() stands for the time of the wait.
+// Sets the state in which Optiboot 4.4, the stock bootloader of Unos, leaves the chip after a reset, according to its
+// listing. It clears MCUSR. After an external reset it waits for a program, with constants in r8 to r11 and an address
+// in r12 and r13, then ends by a watchdog reset, which leaves these registers alone. After any other reset (its own
+// included) it switches the watchdog off, two calls deep, and jumps to the program. uno_hold() models the wait.
 static void bootloader(Uno *uno, int cause) {
   static const uint8_t waiting[] = {1, 0x11, 5, 3};           // r8 to r11
   static const uint8_t returns[] = {0x3F, 0xF7, 0x3F, 0x05};  // on the stack, to its end
@@ -98,7 +99,7 @@ void uno_hang(Uno *uno, int interrupts) {
   if (avr->state == cpu_Sleeping) avr->state = cpu_Running;
 }
 
-// libsimavr calls this last in every reset, a watchdog's included.
+// libsimavr calls this last in every reset, including those by the watchdog.
 static void after_reset(avr_io_t *io) {
   avr_t *avr = io->avr;
   Uno *uno = board_of(avr);
@@ -107,7 +108,7 @@ static void after_reset(avr_io_t *io) {
   avr_extint_set_strict_lvl_trig(avr, 0, 0);
   avr_extint_set_strict_lvl_trig(avr, 1, 0);
   int cause = uno->reset_cause;
-  if (cause < 0) cause = UNO_RESET_WATCHDOG;  // the only one we did not start
+  if (cause < 0) cause = UNO_RESET_WATCHDOG;  // the only reset that uno_reset() does not start
   // MCUSR collects causes until the firmware or a power-on clears them.
   static const uint8_t flag[] = {0x01, 0x02, 0x04, 0x08};
   uno->mcusr = cause == UNO_RESET_POWER_ON ? flag[cause] : uno->mcusr | flag[cause];
@@ -223,7 +224,7 @@ Uno *uno_new(const char *path, char *error, int error_size) {
 
 void uno_free(Uno *uno) {
   avr_t *avr = uno->avr;
-  avr_io_t **link = &avr->io_port;  // ours is part of Uno, not libsimavr's to take apart
+  avr_io_t **link = &avr->io_port;  // ours is part of Uno: libsimavr must not deallocate it
   while (*link && *link != &uno->after_reset) link = &(*link)->next;
   if (*link) *link = uno->after_reset.next;
   avr->custom.data = NULL;
@@ -244,7 +245,7 @@ int uno_run(Uno *uno, uint64_t until_cycle, int stop_on_output) {
   uno->stop_now = stop_on_output && uno->usart.line_out.size > 0;
   if (uno->powered && avr->cycle < uno->held_until) {
     avr->cycle = uno->held_until < until_cycle ? uno->held_until : until_cycle;
-    avr_cycle_timer_process(avr);  // bytes that arrive now meet a receiver that is off
+    avr_cycle_timer_process(avr);  // bytes that arrive now find the receiver off
   }
   while (uno->powered && !uno->crashed && !uno->stop_now && avr->cycle < until_cycle) {
     int state = avr_run(avr);
@@ -254,7 +255,7 @@ int uno_run(Uno *uno, uint64_t until_cycle, int stop_on_output) {
     }
   }
   if (uno->stop_now) return UNO_OUTPUT_READY;
-  if (avr->cycle < until_cycle) avr->cycle = until_cycle;  // dead chips let time pass as well
+  if (avr->cycle < until_cycle) avr->cycle = until_cycle;  // time passes for a dead chip too
   if (!uno->powered) return UNO_POWERED_OFF;
   return uno->crashed ? UNO_CRASHED : UNO_RUNNING;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// D10 as OC1B, the pin that timer 1 sets and clears by itself (datasheet section 15.7): libsimavr tells matches, but
-// neither lets the pin follow nor knows the forced match.
+// D10 as OC1B, the pin that timer 1 sets and clears by itself (datasheet section 15.7): libsimavr reports matches,
+// but neither drives the pin nor implements the forced match.
 #include "avr_timer.h"
 #include "board.h"
 
@@ -49,7 +49,7 @@ uint8_t compare_overrides(const Uno *uno, uint8_t latch) {
 
 void compare_attach(Uno *uno) {
   avr_irq_t *irq = avr_io_getirq(uno->avr, AVR_IOCTL_TIMER_GETIRQ('1'), TIMER_IRQ_OUT_COMP + AVR_TIMER_COMPB);
-  irq->flags &= ~IRQ_FLAG_FILTERED;  // every match counts, also one that repeats the last level
+  irq->flags &= ~IRQ_FLAG_FILTERED;  // every match counts, even one that repeats the last level
   avr_irq_register_notify(irq, on_match, uno);
   avr_io_addr_t io = AVR_DATA_TO_IO(REG_TCCR1A);
   uno->compare.behind.write = uno->avr->io[io].w.c;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// EEPROM (datasheet section 8.4): a write takes 3.4 ms, goes on through a reset, and is half done when the
-// power fails in it. Replaces libsimavr's instantaneous writes; its byte array is used.
+// EEPROM (datasheet section 8.4): a write takes 3.4 ms, continues through a reset, and stays incomplete if the
+// power fails during it. Replaces libsimavr's instantaneous writes, but uses its byte array.
 #include <string.h>
 
 #include "avr_eeprom.h"
@@ -9,7 +9,8 @@
 enum { EERE = 0x01, EEPE = 0x02, EEMPE = 0x04, EERIE = 0x08, EEPM = 0x30 };
 
 static uint64_t write_cycles(uint8_t mode) {
-  return mode == 0 ? CLOCK_HZ / 10000 * 34 : CLOCK_HZ / 10000 * 18;  // 3.4 ms both, 1.8 ms one of them
+  // 3.4 ms to erase and write, 1.8 ms for either alone
+  return mode == 0 ? CLOCK_HZ / 10000 * 34 : CLOCK_HZ / 10000 * 18;
 }
 
 static void raise_level(Uno *uno) {
@@ -49,7 +50,7 @@ static avr_cycle_count_t power_fails(avr_t *avr, avr_cycle_count_t when, void *p
   int flipped = (int)(8.0 * (erasing ? progress : progress - 1.0));
   uint8_t value = erasing ? eeprom->old_value : 0xFF;
   for (int bit = 0; bit < flipped && bit < 8; bit++) {
-    uint8_t mask = 1u << (bit * 3 % 8);  // in no tidy order
+    uint8_t mask = 1u << (bit * 3 % 8);  // not in bit order
     value = erasing ? value | mask : value & (eeprom->new_value | (uint8_t)~mask);
   }
   eeprom->bytes[eeprom->address] = value;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Everything that leaves the board, with its cycle: a log for tests and a running hash for determinism.
-// An event keeps its number for good, also when older ones have been dropped.
+// An event keeps its number even after older ones have been dropped.
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Uno's digital pins with exact cycle stamps. Levels are taken from PORT and DDR themselves, so a pin that
-// a reset or a cleared DDR bit lets go is seen to fall, which libsimavr's own pin signals do not tell.
+// The Uno's digital pins with exact cycle stamps. Levels are taken from PORT and DDR themselves, so a pin
+// released by a reset or a cleared DDR bit is seen to fall; libsimavr's own pin signals do not report that.
 #include "board.h"
 
 static const char port_name[PORT_COUNT] = {'B', 'C', 'D'};
@@ -12,7 +12,7 @@ static void locate(int pin, int *port, int *bit) {
   *bit = pin - first_pin[*port];
 }
 
-// A pin with a gate pull-down: driven high or low. `outputs` are its DDR bits, `levels` PORT & DDR.
+// Reports changed levels. A gate pull-down makes a pin that is not driven low. `outputs`: DDR; `levels`: PORT & DDR.
 static void announce(Uno *uno, int port, uint8_t outputs, uint8_t levels) {
   uint8_t changed = levels ^ uno->driven[port];
   uno->driven[port] = levels;
@@ -44,7 +44,7 @@ static void port_written(avr_t *avr, avr_io_addr_t address, uint8_t value, void 
   update(uno, port);
 }
 
-// What is wired to an input wins over the pull-up. libsimavr would raise pulled-up pins at each PORT write.
+// The level wired to an input overrides its pull-up. libsimavr would raise pulled-up pins at each PORT write.
 static void tell_external(Uno *uno, int port) {
   avr_ioport_external_t external = {.name = port_name[port], .mask = uno->wired[port], .value = uno->input[port]};
   avr_ioctl(uno->avr, AVR_IOCTL_IOPORT_SET_EXTERNAL(port_name[port]), &external);

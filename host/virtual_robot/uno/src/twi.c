@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Two-wire master (datasheet section 21) with an MCP4725 at 0x62 (DS22039) as the only slave. Bits last what
-// TWBR says, an absent address is not acknowledged, and a stuck bus answers nothing at all.
+// Two-wire master (datasheet section 21) with an MCP4725 at 0x62 (DS22039) as the only slave. Bit times follow
+// TWBR, an absent address is not acknowledged, and a stuck bus does not answer at all.
 #include "board.h"
 
 enum { TWINT = 0x80, TWEA = 0x40, TWSTA = 0x20, TWSTO = 0x10, TWWC = 0x08, TWEN = 0x04, TWIE = 0x01 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The public face of the simulated Uno. Time is counted in CPU cycles at 16 MHz and passes only in uno_run().
+// Public interface of the simulated Uno. Time is counted in CPU cycles at 16 MHz and passes only in uno_run().
 #ifndef VIRTUAL_ROBOT_UNO_H
 #define VIRTUAL_ROBOT_UNO_H
 
@@ -7,7 +7,7 @@
 
 typedef struct Uno Uno;
 
-// What the world outside the board offers. Any entry may be NULL.
+// Callbacks into the world outside the board. Any may be NULL.
 typedef struct UnoWorld {
   void *context;
   void (*pin_changed)(void *context, uint64_t cycle, int pin, int level);  // a driven Arduino pin
@@ -24,7 +24,7 @@ typedef struct UnoEvent {
 
 enum { UNO_EVENT_PIN = 1, UNO_EVENT_UART_OUT, UNO_EVENT_DAC, UNO_EVENT_EEPROM, UNO_EVENT_RESET };
 enum { UNO_RESET_POWER_ON = 0, UNO_RESET_EXTERNAL, UNO_RESET_BROWN_OUT, UNO_RESET_WATCHDOG };
-// Stuck: nothing is answered. Held: what is sent is acknowledged, but the bus is held before it can be let go.
+// Stuck: nothing is answered. Held: bytes are acknowledged, but the bus is held so that no transfer can end.
 enum { UNO_DAC_PRESENT = 0, UNO_DAC_ABSENT, UNO_BUS_STUCK, UNO_BUS_HELD };
 enum { UNO_RUNNING = 0, UNO_OUTPUT_READY, UNO_POWERED_OFF, UNO_CRASHED };
 
@@ -52,13 +52,13 @@ int uno_run(Uno *uno, uint64_t until_cycle, int stop_on_output);
 void uno_status(const Uno *uno, UnoStatus *status);
 
 void uno_reset(Uno *uno, int cause);
-// No program runs for so long; what is around the processor does. So it is with a bootloader after an external reset,
-// where what is sent meanwhile meets a receiver that is off.
+// Executes nothing for this long, while everything around the processor keeps running, as during a bootloader's wait
+// after an external reset. Bytes sent meanwhile are lost: the receiver is off.
 void uno_hold(Uno *uno, uint64_t cycles);
 void uno_power_off(Uno *uno);
-// As on a Uno with its stock bootloader (Optiboot 4.4) from the next reset on: see bootloader() in chip.c.
+// From the next reset on, behaves like a Uno with its stock bootloader (Optiboot 4.4): see bootloader() in chip.c.
 void uno_use_optiboot(Uno *uno, int use);
-// The program loops for ever at the instruction that comes next, with interrupts on or off; a reset mends it.
+// Makes the program loop forever at its next instruction, with interrupts on or off, until a reset.
 void uno_hang(Uno *uno, int interrupts);
 
 int uno_uart_send(Uno *uno, const uint8_t *bytes, int size, double baud);
@@ -67,7 +67,7 @@ int uno_uart_pending(const Uno *uno);  // bytes sent to the Uno that have not fu
 
 int uno_pin(const Uno *uno, int pin);  // level of a driven pin, -1 = not driven
 void uno_set_input(Uno *uno, int pin, int level);
-void uno_set_analog(Uno *uno, int channel, double volts);  // used where the world has no analog_volts
+void uno_set_analog(Uno *uno, int channel, double volts);  // used if the world has no analog_volts
 void uno_set_bus(Uno *uno, int mode);
 
 void uno_eeprom_read(const Uno *uno, uint8_t *bytes, int size);
@@ -78,13 +78,14 @@ void uno_eeprom_cut_power(Uno *uno, int n, double fraction);
 void uno_peek_ram(const Uno *uno, uint16_t address, uint8_t *bytes, int size);
 void uno_poke_ram(Uno *uno, uint16_t address, const uint8_t *bytes, int size);
 uint32_t uno_program_counter(const Uno *uno);
-// Bytes above `from` that the firmware has never written since power-on (RAM starts painted).
+// Number of bytes from `from` upwards, without a gap, that the firmware has not written since power-on (RAM starts
+// painted).
 int uno_untouched_ram(const Uno *uno, uint16_t from);
 
-// Events are numbered from 0 since uno_keep_events(); the log keeps at least the last half a million.
-// Returns how many from number `first` on were copied, -1 if that one has been dropped.
+// Events are numbered from 0 since uno_keep_events(); the log keeps at least the last half million.
+// Returns how many were copied from number `first` on, -1 if that event has been dropped.
 int uno_events(const Uno *uno, UnoEvent *events, int64_t first, int capacity);
-int64_t uno_event_count(const Uno *uno);  // also those that have been dropped
+int64_t uno_event_count(const Uno *uno);  // including dropped ones
 void uno_keep_events(Uno *uno, int keep);
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // USART0 (datasheet section 19): true frame length, two-byte receive buffer with overrun, double-buffered
-// transmitter, level-triggered interrupts. Replaces libsimavr's model (11 bits a byte, 64-byte buffer).
+// transmitter, level-triggered interrupts. Replaces libsimavr's model (11 bits per byte, 64-byte buffer).
 #include "board.h"
 
 enum { RXC = 0x80, TXC = 0x40, UDRE = 0x20, FE = 0x10, DOR = 0x08, U2X = 0x02 };
@@ -29,7 +29,7 @@ static void raise_levels(Uno *uno) {
 
 static void on_return(avr_irq_t *irq, uint32_t value, void *param) {
   (void)irq;
-  if (value == 0) raise_levels(param);  // a level that is still there fires again after RETI
+  if (value == 0) raise_levels(param);  // an interrupt level that persists fires again after RETI
 }
 
 static void show_head(Uno *uno) {
@@ -51,7 +51,7 @@ static void fifo_push(Usart *usart, uint8_t byte, uint8_t flags) {
   usart->fifo[usart->fifo_size++].flags = flags;
 }
 
-// What the receiver makes of a byte sent at another speed: sampled mid-bit at its own rate.
+// The byte that the receiver reads if it was sent at another speed: sampled mid-bit at the receiver's own rate.
 static uint8_t sample(const Uno *uno, const ByteAt *sent, uint8_t *flags) {
   uint32_t frame = 0x200u | (uint32_t)sent->byte << 1;  // start, 8 data, stop; idle is high
   double own = cycles_per_bit(uno);
@@ -146,7 +146,7 @@ static void udr_write(avr_t *avr, avr_io_addr_t address, uint8_t value, void *pa
     usart->sending_byte = value;
     chip_at(uno, avr->cycle + cycles_per_frame(uno), byte_leaves);
   } else {
-    usart->buffered = true;  // written while UDRE was clear, the older byte is lost, as on the chip
+    usart->buffered = true;  // if written while UDRE was clear, the older byte is lost, as on the chip
     usart->buffered_byte = value;
     chip_clear_flag(uno, VECTOR_USART_UDRE, REG_UCSRA, UDRE);
   }
@@ -191,7 +191,7 @@ void usart_after_reset(Uno *uno) {
   uno->avr->data[REG_UCSRA] = UDRE;
   uno->avr->data[REG_UCSRB] = 0;
   uno->avr->data[REG_UCSRC] = 0x06;
-  if (usart->line_in.size > 0) {  // the wire does not know of the reset, but its timer was wiped
+  if (usart->line_in.size > 0) {  // a reset does not affect the wire, but cancelled its timer
     chip_at(uno, usart->line_in.items[usart->line_in.first].cycle, byte_arrives);
   }
 }

@@ -12,7 +12,7 @@ variant = framework / "variants" / board.get("build.variant")
 
 
 def without_warnings(env, node):
-    """Compile one of Arduino's own files: what gcc 5.4 finds odd in them is nobody's business here."""
+    """Compile one of Arduino's own files without gcc 5.4's warnings, which are not this project's concern."""
     return env.Object(node, CCFLAGS=[*env["CCFLAGS"], "-w"])
 
 

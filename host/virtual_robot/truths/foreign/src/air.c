@@ -4,7 +4,7 @@
 
 // --- supplies ---------------------------------------------------------------------------------------------------
 
-// Mean 0, greatest value about 1, period 1.
+// Waveform of a hunting regulator: zero mean, peak about 1, period 1.
 static double hunting(const ForeignRobot *r, double turns) {
   double at = turns - floor(turns), rise = r->hunt_skew;
   double up = at < rise, share = up ? at / rise : (at - rise) / (1.0 - rise);
@@ -39,7 +39,7 @@ double foreign_throat(double conductance, double critical, double source, double
   return source >= sink ? flow : -flow;
 }
 
-// The throat before eq. (2)'s linear resistance: the pressure between them, by the Illinois method.
+// Pressure between the throat and the linear resistance of eq. (2) behind it, by the Illinois method.
 static double between(double conductance, double critical, double alpha, double source, double sink) {
   double a = sink, b = source;
   double at_a = foreign_throat(conductance, critical, source, a), at_b = -alpha * (b - sink);
@@ -65,7 +65,7 @@ static double between(double conductance, double critical, double alpha, double 
 
 // --- chambers ---------------------------------------------------------------------------------------------------
 
-// Over the body's; an end has three actuators.
+// Volume relative to the body's; an end of the robot has three actuators.
 static double volume(const Foreign *f, int chamber) {
   if (chamber == 0) return 1.0;
   const ForeignRobot *r = f->r;
@@ -106,7 +106,7 @@ static void line(const Foreign *f, const double *y, double *dy, int chamber, dou
     d[0] = cell[1];
     d[1] = omega * omega * (source - cell[0]) - 2.0 * r->line_damping * omega * cell[1];
   } else if (r->line_form == 2) {
-    double rate = 6.0 / r->line_s;  // Elmore's delay of three equal cells is six times one's
+    double rate = 6.0 / r->line_s;  // the Elmore delay of three equal cells is six times that of one
     d[0] = rate * (source - 2.0 * cell[0] + cell[1]);
     d[1] = rate * (cell[0] - 2.0 * cell[1] + cell[2]);
     d[2] = rate * (cell[1] - cell[2]);
@@ -121,7 +121,7 @@ static double at_the_sensor(const Foreign *f, double t, const double *y, int cha
   double inside = (y[FORCE + chamber] - foreign_damping(f, y, chamber) * v) / foreign_area(f, chamber, x);
   if (r->thermal_share > 0) inside += y[HEAT + chamber];
   if (r->drop_share <= 0) return inside;
-  const double usual = 12.0;  // psi of drop where the linear share would be drop_share
+  const double usual = 12.0;  // psi of drop at which the share is drop_share
   double drop = supplied(f, t, y, f->source[chamber]) - inside;
   return inside + r->drop_share * drop * pow(fabs(drop) / usual, r->drop_power - 1.0);
 }
@@ -134,7 +134,7 @@ static void sensor(const Foreign *f, double t, const double *y, double *dy, int 
     double omega = 2.0 * r->sensor_damping / r->sensor_s;
     dy[SENSOR + 2 * chamber] = s[1];
     dy[SENSOR + 2 * chamber + 1] = omega * omega * off - 2.0 * r->sensor_damping * omega * s[1];
-  } else {  // an orifice before the sensor's volume: flow as the root of the drop; laminar below 0.05 psi
+  } else {  // an orifice before the sensor's volume: flow goes as the root of the drop; laminar below 0.05 psi
     dy[SENSOR + 2 * chamber] = off / r->sensor_s * sqrt(1.0 / (fabs(off) + 0.05));
   }
 }
@@ -143,9 +143,9 @@ double foreign_reading(const Foreign *f, const double *y, int chamber) {
   return f->r->sensor_form ? y[SENSOR + 2 * chamber] : at_the_sensor(f, f->t, y, chamber);
 }
 
-// --- all of it --------------------------------------------------------------------------------------------------
+// --- derivative -------------------------------------------------------------------------------------------------
 
-// Eq. (2) as the paper has it, for the force. Called after the mechanics.
+// Eq. (2) in the paper's form, for the force. Called after the mechanics.
 void foreign_air(const Foreign *f, double t, const double *y, double *dy) {
   const ForeignRobot *r = f->r;
   double drawn[2] = {0, 0};

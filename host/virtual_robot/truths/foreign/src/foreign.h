@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Another robot of the same design, stated without the plant's equations: forces and momenta in place of pressures
-// and speeds, a truss for its spring, other published forms for every effect. SI units, pressures in psi above the
-// surroundings, displacements from the contracted stable state. docs/truths.md has the sources.
+// Another robot of the same design, modelled without the plant's equations: forces and momenta in place of pressures
+// and speeds, a truss as its spring, other published forms of every effect. SI units, pressures in psi above the
+// surroundings, displacements from the contracted stable state. docs/truths.md names the sources.
 #ifndef VIRTUAL_ROBOT_FOREIGN_H
 #define VIRTUAL_ROBOT_FOREIGN_H
 
@@ -9,12 +9,12 @@
 typedef struct ForeignSpring {
   double half_span_m, rise_m, bar_N_m;  // two bars, from -rise to +rise
   double hinge_Nm, hinge_rest_rad;
-  double stop_in_N, stop_in_m, stop_out_N, stop_out_m;  // force at the truss's own stable points, length of its growth
-  double zero_m;                                        // of the contracted state, from the truss's lower stable point
+  double stop_in_N, stop_in_m, stop_out_N, stop_out_m;  // force at the truss's own stable points, e-folding length
+  double zero_m;                                        // contracted state, from the truss's lower stable point
   double unstable_m, extended_m;
 } ForeignSpring;
 
-// [2]: body, small actuator. What is 0 is absent.
+// [2]: body, small actuator. An effect whose parameters are 0 is absent.
 typedef struct ForeignRobot {
   ForeignSpring spring[2];
   double damping_Ns_m[2], area_N_psi[2], alpha_n_per_s[2], alpha_s_per_s[2];
@@ -52,7 +52,7 @@ typedef struct ForeignRobot {
   int direction_wall_only;
   double slope_rad, slope_rad_m;
   double tether_N, tether_m;
-  // In no library.
+  // Effects in no library.
   double thermal_share, thermal_s;
   double warm_share, warm_s, warm_W;
   double creep_m_s, creep_psi, creep_limit_m;
@@ -61,14 +61,14 @@ typedef struct ForeignRobot {
 } ForeignRobot;
 
 typedef struct ForeignTrial {
-  int experiment, chamber;  // LOCOMOTION.. and 0 body, 1 head, 2 tail
-  int start;                // source that all chambers in use have been connected to: 0 vent, 1 positive, 2 vacuum
+  int experiment, chamber;  // LOCOMOTION and so on; 0 body, 1 head, 2 tail
+  int start;                // source that all chambers in use are connected to at first: 0 vent, 1 positive, 2 vacuum
   double travel_m, rate_m_s;
   int there_and_back;
-  double creep_m[2];  // what body and small actuators have crept before; after the trial: by its end
+  double creep_m[2];  // creep of body and small actuators before the trial; on return, at its end
   double tolerance;   // 1 = usual
   int frictionless;   // for tests: no damper, no wall, no dry friction
-  double steps;       // out: accepted and rejected
+  double steps;       // output: accepted and rejected steps
 } ForeignTrial;
 
 typedef struct ForeignEdge {
@@ -84,7 +84,7 @@ typedef struct ForeignSample {
   int sliding[2];
 } ForeignSample;
 
-// Settles for as long as it takes, then runs over `times_s` (increasing, from 0). 0 = done, else it got stuck.
+// Lets the robot settle, then samples it at `times_s` (increasing, from 0). Returns 0, or 1 if it gets stuck.
 int foreign_run(const ForeignRobot *robot, ForeignTrial *trial, const ForeignEdge *edges, int edge_count,
                 const double *times_s, int count, ForeignSample *samples);
 double foreign_spring(const ForeignSpring *spring, double x, double crept);

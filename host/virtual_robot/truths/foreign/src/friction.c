@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Wall, weight and dry friction of the two halves, and of the head that is pulled.
+// Wall, weight and dry friction of the two halves, and of the pulled head.
 #include "inside.h"
 
 #define TAIL_BEHIND_M 0.15  // where the tail touches the pipe, behind the head
@@ -7,7 +7,7 @@
 double foreign_crosshead(const Foreign *f, double t, double *rate) {
   const ForeignTrial *trial = f->trial;
   double way = trial->rate_m_s * fmax(t, 0.0), speed = t >= 0 ? trial->rate_m_s : 0.0;
-  if (way >= trial->travel_m - 1e-12) {  // a step that begins at the turn belongs to the way back
+  if (way >= trial->travel_m - 1e-12) {  // a step that begins at the turn belongs to the return leg
     way = trial->there_and_back ? fmax(2.0 * trial->travel_m - way, 0.0) : trial->travel_m;
     speed = trial->there_and_back && way > 0 ? -trial->rate_m_s : 0.0;
   }
@@ -64,7 +64,7 @@ static double weight(const Foreign *f, int end) {
   return G_M_S2 * (f->trial->experiment == PULL ? f->r->segment_mass_kg : f->r->half_mass_kg[end]);
 }
 
-// Eq. (6) and the weight's part along the pipe.
+// Eq. (6) and the component of the weight along the pipe.
 double foreign_pull(const Foreign *f, const double *y, int end) {
   double push = foreign_push(f, y, 0);
   return (end ? -push : push) - weight(f, end) * sin(slope(f, y, end));
@@ -76,7 +76,7 @@ static double seam(const ForeignRobot *r, double place) {  // climbs a lip, drop
   return along < 1.0 ? 1.0 + r->seam_rise * along : 1.0;
 }
 
-// 1 at rest, 0 where friction is kinetic.
+// Share of static friction: 1 at rest, 0 if friction is purely kinetic.
 static double still(const ForeignRobot *r, double speed, bool at_rest) {
   if (at_rest) return 1.0;
   double ratio = r->stribeck_form ? speed / r->stribeck_m_s : 0.0;
@@ -98,7 +98,7 @@ double foreign_grip(const Foreign *f, const double *y, int end, int direction, d
   return grip;
 }
 
-// Of the load cell, with the slack and give of its train, when the head has slid so far.
+// Force of the load cell once the head has slid by `slid`, with the slack and compliance of the load train.
 double foreign_load(const Foreign *f, double t, double slid) {
   const ForeignRobot *r = f->r;
   double pulled = foreign_crosshead(f, t, NULL) - slid, load = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the files of the foreign robot share.
+// Declarations shared by the files of the foreign robot.
 #ifndef VIRTUAL_ROBOT_FOREIGN_INSIDE_H
 #define VIRTUAL_ROBOT_FOREIGN_INSIDE_H
 
@@ -16,17 +16,17 @@
 enum { WALK = 0, STEP, STATIC, PULL };
 enum { OFF = 0, POSITIVE_SUPPLY, VACUUM_PUMP };
 
-// The state. Blocks of three are body, head, tail.
+// Layout of the state. Blocks of three are in the order body, head, tail.
 enum {
   X = 0,             // head, tail
   MOMENTUM = X + 2,  // head, tail
   X_ACT = MOMENTUM + 2,
   P_ACT = X_ACT + 2,  // small actuators of head and tail
-  FORCE = P_ACT + 2,  // F of eq. (2), of one actuator
+  FORCE = P_ACT + 2,  // F of eq. (2), for one actuator
   CELL = FORCE + 3,   // three cells of the line for each chamber
   BOUC = CELL + 9,
   PRONY = BOUC + 3,     // five branches for each actuator
-  SENSOR = PRONY + 15,  // and its rate
+  SENSOR = PRONY + 15,  // reading and its rate
   RESERVOIR = SENSOR + 6,
   HEAT = RESERVOIR + 2,
   WARMTH = HEAT + 3,
@@ -39,12 +39,12 @@ typedef struct Foreign {
   ForeignTrial *trial;
   double y[SIZE];
   double t;
-  // What changes only between steps.
+  // State that changes only between steps.
   int source[3], slide[2];  // slide: -1, 0 = sticks, 1
   double opened_s[3];
-  int side[3];  // of the dead zone that the mechanism rests against, 1 = it is pulled outwards
-  double play[3][3], slip[3][4], anchor[3];  // where plays and slips were at the last step, for a stroke `anchor`
-  bool loose;                                // the pulled head slides
+  int side[3];                               // of the dead zone, where the mechanism rests; 1 = it is pulled outwards
+  double play[3][3], slip[3][4], anchor[3];  // plays and slips after the last step, at stroke `anchor`
+  bool loose;                                // whether the pulled head slides
   double slid_m;
 } Foreign;
 

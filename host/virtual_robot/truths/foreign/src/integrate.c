@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Dormand and Prince's pair of order 5(4) with step-size control and dense output (E. Hairer, S. P. Norsett,
-// G. Wanner, Solving Ordinary Differential Equations I, 1993, II.4 to II.6). Moments at which the equations change
-// (a half stops or breaks away, a wall is met, a pouch begins to bulge) are found on the dense output, and the next
-// step begins there; so does every valve's edge and every turn of the cross-head.
+// G. Wanner, Solving Ordinary Differential Equations I, 1993, II.4 to II.6). Times at which the equations change
+// (a half stops or breaks away, a wall is met, a pouch begins to bulge) are located on the dense output, and the next
+// step begins there; steps also end at every valve edge and every turn of the cross-head.
 #include <string.h>
 
 #include "inside.h"
@@ -45,14 +45,14 @@ static double allowed_error(int i) {
   if (i < X_ACT) return 1e-7;                                         // kg m/s
   if (i < FORCE) return 2e-8;                                         // kg m/s, small actuators
   if (i >= PRONY && i < SENSOR) return 1e-4;                          // N
-  if (i >= BOUC && i < PRONY) return 1e-5;                            // of 1
+  if (i >= BOUC && i < PRONY) return 1e-5;                            // dimensionless
   if (i >= CREEP) return 1e-8;                                        // m
   if (i >= SENSOR && i < RESERVOIR && (i - SENSOR) % 2) return 1e-2;  // psi/s
   if (i >= CELL && i < BOUC && (i - CELL) % 3 == 1) return 1e-3;      // psi or psi/s
   return 1e-4;                                                        // N, psi
 }
 
-// From k[0]; the error in units of what is allowed.
+// Attempts a step, given k[0]; returns its error relative to the allowed error.
 static double attempt(Foreign *f, Step *s) {
   double at[SIZE];
   for (int stage = 1; stage < 7; stage++) {
@@ -101,7 +101,7 @@ static void at_share(const Step *s, double share, double *y) {
 static void event_values(const Foreign *f, double t, const double *y, double *g) {
   for (int i = 0; i < EVENTS; i++) g[i] = 1.0;
   for (int chamber = 0; chamber < 3 && f->r->gap_m > 0; chamber++) {
-    if (!in_use(f, chamber)) continue;  // lets go of one side and is caught by the other
+    if (!in_use(f, chamber)) continue;  // event: the mechanism lets go of one side and meets the other
     double here = foreign_against(f, y, chamber, f->side[chamber]);
     g[LET_GO + chamber] = fmax(here, -foreign_against(f, y, chamber, -f->side[chamber]));
   }
@@ -132,7 +132,7 @@ static bool happens(int event, double before, double now) {
   return (before < 0) != (now < 0);
 }
 
-// The share of the step after which the first event has happened; 1 if none does.
+// Returns the share of the step after which the first event has happened, and which one; 1 and -1 if there is none.
 static double first_event(const Foreign *f, const Step *s, int *which) {
   double before[EVENTS], after[EVENTS], y[SIZE], now[EVENTS], first = 1.0;
   event_values(f, s->t, s->y0, before);
@@ -179,7 +179,7 @@ static void follow_the_pull(Foreign *f) {
 
 static double clip(double value, double half, double middle) { return fmin(fmax(value, middle - half), middle + half); }
 
-// Plays and slips have followed the stroke.
+// Updates plays and slips for the new stroke.
 static void remember(Foreign *f) {
   for (int chamber = 0; chamber < 3; chamber++) {
     if (!in_use(f, chamber)) continue;
@@ -192,7 +192,7 @@ static void remember(Foreign *f) {
   }
 }
 
-// --- the way through a trial ------------------------------------------------------------------------------------
+// --- running a trial --------------------------------------------------------------------------------------------
 
 static void sample_at(const Foreign *f, const Step *s, double t, ForeignSample *out) {
   Foreign now = *f;
@@ -237,7 +237,7 @@ typedef struct Outlet {
   ForeignSample *samples;
 } Outlet;
 
-// Until `end` without an edge of a valve or a turn in between. False if it does not get there.
+// Integrates to `end`, with no valve edge or turn in between. Returns false if it gets stuck.
 static bool advance(Foreign *f, double end, double *try_s, Outlet *out) {
   const double longest = f->trial->experiment == STATIC ? 0.05 : f->t < 0 ? 0.02 : 0.005;
   Step s;
@@ -252,7 +252,7 @@ static bool advance(Foreign *f, double end, double *try_s, Outlet *out) {
     double factor = isfinite(error) ? 0.9 * pow(fmax(error, 1e-8), -0.2) : 0.1;
     *try_s = s.h * fmin(fmax(factor, 0.2), 5.0);
     if (++f->trial->steps > MAX_STEPS) return false;
-    known = true;  // k[0] is still that of this place
+    known = true;  // k[0] still belongs to this state
     if (!(error <= 1.0)) {
       if (s.h < 1e-11) return false;
       continue;
@@ -292,11 +292,11 @@ static void switch_valves(Foreign *f, const ForeignEdge *edges, int count, int *
   }
 }
 
-// Contracted, vented; `start` has just been connected.
+// Contracted, with `start` just connected.
 static void place(Foreign *f) {
   const ForeignRobot *r = f->r;
   f->t = -SETTLE_S;
-  if (f->trial->experiment == PULL) f->y[X_ACT] = r->wall_offset_m;  // extended by pressure before
+  if (f->trial->experiment == PULL) f->y[X_ACT] = r->wall_offset_m;  // already extended by pressure
   f->y[RESERVOIR] = r->positive_psi;
   f->y[RESERVOIR + 1] = r->negative_psi;
   for (int i = 0; i < 2; i++) f->y[CREEP + i] = f->trial->creep_m[i];
@@ -317,14 +317,14 @@ int foreign_run(const ForeignRobot *robot, ForeignTrial *trial, const ForeignEdg
   place(&f);
   double try_s = 1e-4;
   if (!advance(&f, 0.0, &try_s, NULL)) return 1;
-  memset(f.y + PRONY, 0, 15 * sizeof *f.y);  // it has rested for long
+  memset(f.y + PRONY, 0, 15 * sizeof *f.y);  // relaxed after a long rest
   f.y[WARMTH] = 0;
   int next = 0;
   while (out.done < count) {
     switch_valves(&f, edges, edge_count, &next);
     double until = fmin(times_s[count - 1], next_turn(&f));
     if (next < edge_count) until = fmin(until, edges[next].time_s);
-    if (until <= f.t + 1e-12) {  // the last sample is here
+    if (until <= f.t + 1e-12) {  // at the last sample
       Step none = {.h = 0};
       while (out.done < count) sample_at(&f, &none, f.t, &samples[out.done++]);
       break;

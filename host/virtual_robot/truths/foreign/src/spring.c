@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bistable spring and what remembers its motion.
+// The bistable spring and the elements with memory of its motion.
 #include "inside.h"
 
-// `crept`: the pouch gives way at the extended end only.
+// `crept`: creep of the pouch, which shifts the stop at the extended end only.
 double foreign_spring(const ForeignSpring *s, double x, double crept) {
   double from_truss = x + s->zero_m, w = from_truss - s->rise_m;
   double bar = hypot(s->half_span_m, w), free_bar = hypot(s->half_span_m, s->rise_m);
@@ -18,8 +18,8 @@ static double clip(double value, double low, double high) { return value < low ?
 
 static double crept(const double *y, int chamber) { return y[CREEP + kind(chamber)]; }
 
-// Nordin and Gutman's dead zone between the end and a mechanism that weighs nothing: what the mechanism would push
-// with against one side of it (1: the end pulls it outwards); negative if it would let go.
+// Nordin and Gutman's dead zone between the actuator's end and a massless mechanism. Returns the mechanism's force
+// against one side of it (1: the end pulls it outwards); negative if it would let go.
 double foreign_against(const Foreign *f, const double *y, int chamber, int side) {
   double x = foreign_stroke(f, y, chamber, NULL) - 0.5 * side * f->r->gap_m;
   return side * foreign_spring(&f->r->spring[kind(chamber)], x, crept(y, chamber));
@@ -68,7 +68,7 @@ double foreign_area(const Foreign *f, int chamber, double x) {
   return area * (1.0 + r->area_slope * shape);
 }
 
-// What an actuator pushes its ends apart with.
+// The force that pushes an actuator's ends apart.
 double foreign_push(const Foreign *f, const double *y, int chamber) {
   const ForeignRobot *r = f->r;
   double v, x = foreign_stroke(f, y, chamber, &v);
@@ -145,7 +145,7 @@ void foreign_mechanics(const Foreign *f, const double *y, double *dy) {
 }
 
 double foreign_energy(const Foreign *f, const double *y) {
-  // Simpson from the contracted state; only the body on the stand is asked for.
+  // Simpson's rule from the contracted state; only needed for the body on the stand.
   double x = foreign_stroke(f, y, 0, NULL), h = x / 400.0, sum = 0;
   for (int i = 0; i <= 400; i++) {
     double weight = i == 0 || i == 400 ? 1.0 : i % 2 ? 4.0 : 2.0;
