@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks import loop
 from benchmarks import records as lines
 from bifa.campaign.walks import measure_walks, speed_of
-from bifa.gait.prediction import FELL, Prediction, Predictor
+from bifa.gait.prediction import MIN_SPEED_RATIO, Prediction, Predictor
 from bifa.gait.settling import STANDING_MM_S
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import Model, load_model
@@ -57,7 +57,7 @@ def at_the_cliff(model: Model, gait: Gait) -> list[tuple[float, Prediction]]:
     def predicted(faster: float) -> Prediction:
         return predictor.of(replace(gait, period_s=gait.period_s * (1.0 - faster)), cycles=_CYCLES)
 
-    least = FELL * predicted(0.0).speed_mm_s  # a robot that falls may still creep
+    least = MIN_SPEED_RATIO * predicted(0.0).speed_mm_s  # a robot that falls may still creep
 
     def share(faster: float) -> float:
         return float(np.mean(predicted(faster).speeds_mm_s >= least))
@@ -84,7 +84,7 @@ def walked(folder: Path, effect: str, seed: int) -> list[Step]:
         with tempfile.TemporaryDirectory() as aside, loop.robot(effect, seed).open(_STAGE + number) as rig:
             dataset = measure_walks(rig, Path(aside) / "walks", {"g": quicker}, _CYCLES, RUNS)
         runs = tuple(speed_of(trial).mean_mm_s for trial in dataset.trials)
-        least = max(FELL * prediction.speed_mm_s, STANDING_MM_S)
+        least = max(MIN_SPEED_RATIO * prediction.speed_mm_s, STANDING_MM_S)
         which = tuple(speed >= least for speed in runs)
         steps.append(Step(faster, prediction.walks_probability, prediction.interval_90_mm_s, runs, which))
     return steps

@@ -32,7 +32,7 @@ from bifa.campaign.stages import Stage, run_stages
 from bifa.campaign.walks import measure_walks, planned_cycles, prediction_of, speed_of, walks_of
 from bifa.data import read_dataset
 from bifa.gait import SearchError
-from bifa.gait.prediction import FELL
+from bifa.gait.prediction import MIN_SPEED_RATIO
 from bifa.gait.settling import STANDING_MM_S, complete_cycles
 from bifa.robot import load_model
 from bifa.robot.gait import BASELINE, save_gait
@@ -57,7 +57,7 @@ class Walked:
     @property
     def walks(self) -> tuple[bool, ...]:
         """Which runs walk."""
-        least = max(FELL * self.predicted_mm_s, STANDING_MM_S)
+        least = max(MIN_SPEED_RATIO * self.predicted_mm_s, STANDING_MM_S)
         return tuple(speed >= least for speed in self.runs_mm_s)
 
     def holds(self, level: float) -> list[bool]:

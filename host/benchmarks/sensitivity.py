@@ -19,7 +19,7 @@ from benchmarks.small.draw import UntellableError, drawn
 from benchmarks.small.offered import Offered
 from benchmarks.small_systems import COUNTS, compiled, jobs
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.diagnose import decided, explanations
+from lacuna.diagnosis.diagnose import decide, explanations
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.split import split_trials
 from lacuna.diagnosis.workers import Stoppable, Workers
@@ -57,7 +57,7 @@ def names_under(offered: Offered, policies: dict[tuple[str, float], Policy]) -> 
     found = explanations(case, case.fit_base(1), hand)
     said = {}
     for key, policy in {("", 1.0): POLICY, **policies}.items():
-        _, choice, judged = decided(case.ruled_by(policy) if key[0] else case, found, hand)
+        _, choice, judged = decide(case.with_policy(policy) if key[0] else case, found, hand)
         named = sorted(choice.candidate.effects) if judged.verdict == "identified" else [judged.verdict]
         said[key] = tuple(named)
     return said

@@ -19,7 +19,7 @@ from typing import IO
 
 from bifa.errors import BifaError
 
-_FARTHEST = 1 << 30  # position of the byte locked on Windows, beyond the text, since locked bytes cannot be read
+_LOCK_POSITION = 1 << 30  # position of the byte locked on Windows, beyond the text, since locked bytes cannot be read
 
 
 class LockedError(BifaError):
@@ -33,7 +33,7 @@ def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
     folder = Path(folder).resolve()
     folder.parent.mkdir(parents=True, exist_ok=True)
     path = folder.with_name(f".{folder.name}.lock")
-    file = _taken(path, folder)
+    file = _acquire(path, folder)
     try:
         file.truncate(0)
         file.write(json.dumps(_who(), indent=1) + "\n")
@@ -45,7 +45,7 @@ def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
         file.close()
 
 
-def _taken(path: Path, folder: Path) -> IO[str]:
+def _acquire(path: Path, folder: Path) -> IO[str]:
     """Open the lock file and lock it."""
     while True:
         try:
@@ -56,7 +56,9 @@ def _taken(path: Path, folder: Path) -> IO[str]:
             file.seek(0)
             text = file.read()
             file.close()
-            raise LockedError(f"{folder} is being written by {_words(text)}: wait for it, or choose another folder")
+            raise LockedError(
+                f"{folder} is being written by {_describe_holder(text)}: wait for it, or choose another folder"
+            )
         with suppress(OSError):
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 return file
@@ -81,7 +83,7 @@ def _who() -> dict[str, object]:
     }
 
 
-def _words(text: str) -> str:
+def _describe_holder(text: str) -> str:
     try:
         who = json.loads(text)
         return f"`{who['command']}` (process {who['pid']} on {who['host']}, since {who['since']})"
@@ -93,7 +95,7 @@ if sys.platform == "win32":
     import msvcrt
 
     def _lock(file: IO[str]) -> None:
-        file.seek(_FARTHEST)
+        file.seek(_LOCK_POSITION)
         msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
 
 else:

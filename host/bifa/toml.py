@@ -4,9 +4,9 @@ import re
 import tomllib
 from typing import Any
 
-MOST_PARTS = 100  # in a dotted key; tomllib's time and memory grow with the square of their number
+MAX_KEY_PARTS = 100  # in a dotted key; tomllib's time and memory grow with the square of their number
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
-_LONG_KEY = re.compile(rf"(?<![\w\\-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS},}}+", re.ASCII)
+_LONG_KEY = re.compile(rf"(?<![\w\\-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_KEY_PARTS},}}+", re.ASCII)
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -15,7 +15,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     text = text.removeprefix("\ufeff")
     if long := _LONG_KEY.search(text):
         line = text.count("\n", 0, long.start()) + 1
-        raise tomllib.TOMLDecodeError(f"A key of over {MOST_PARTS} parts (at line {line})")
+        raise tomllib.TOMLDecodeError(f"A key of over {MAX_KEY_PARTS} parts (at line {line})")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError:

@@ -16,7 +16,7 @@ from lacuna.errors import DeclarationError
 from lacuna.system import START_FACTORS, Effect, Parameter
 
 LIMITS = (0.4, 0.7, 0.9, 1.0, 1.2)  # start factors for the inverse of a declared limit, on both sides of it
-_FAR = 3.0  # times the typical size: an effect that is absent at least this far out is a limit
+_MIN_LIMIT_RATIO = 3.0  # times the typical size: an effect that is absent at least this far out is a limit
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def of_parameter(p: Parameter, ordered: bool = False) -> Coordinate:
 
 def of_size(p: Parameter, absent: float) -> Coordinate:
     """Coordinate of a parameter that sets the size of an effect."""
-    far = abs(absent) >= _FAR * abs(p.value) and absent * p.value > 0.0
+    far = abs(absent) >= _MIN_LIMIT_RATIO * abs(p.value) and absent * p.value > 0.0
     return INVERSE if far and (p.lower >= 0.0 or p.upper <= 0.0) else PLAIN
 
 

@@ -133,7 +133,7 @@ class FunctionSystem(System):
         self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in free}
         self.parameters = tuple(self._coordinates[p.name].of(p) for p in free)
         self.effects: dict[str, Effect] = {}
-        # the value of every parameter that is not being fitted; an effect's are its values while it is off
+        # value of every parameter, for those not in `theta`; an effect's are its values while it is off
         self._off: dict[str, float] = {p.name: p.value for p in given}
         for effect in library:
             self.effects[effect.name], coordinates = of_effect(self.held.without(effect))
@@ -167,8 +167,8 @@ class FunctionSystem(System):
         return f"System({self.name!r}, {len(self.parameters)} parameters, {len(self.effects)} effects)"
 
     def with_trials(self, trials: Iterable[Record]) -> FunctionSystem:
-        """A copy of the system with these measured records. Raises DeclarationError if it declares something for a
-        condition, experiment or output that none of them has."""
+        """A copy of the system with these measured records. Raises DeclarationError if they lack a condition or output
+        that it names, or all experiments of an effect or curve."""
         trials = tuple(trials)
         conditions, outputs = {t.condition for t in trials}, {name for t in trials for name in t.channels}
         experiments = {t.experiment for t in trials}
@@ -264,7 +264,7 @@ class FunctionSystem(System):
 
     def _called(self, record: Record, values: Values) -> Any:
         """Call `simulate`; once it is seen to reuse an output array, only from one thread at a time."""
-        values = values.at_hand()
+        values = values.with_attributes()
         if self._refills:
             with _ONE_AT_A_TIME:
                 return _copy(self.simulate(record, values))
@@ -315,9 +315,9 @@ class FunctionSystem(System):
         an output whose shape differs from the measured one, the prediction is NaN. Raises MisuseError, naming trial and
         values, for any other error of the model."""
         corrections = corrections or [()] * len(thetas)
-        return [self._sought(*one, effects) for one in zip(thetas, trials, corrections, strict=True)]
+        return [self._predict_or_nan(*one, effects) for one in zip(thetas, trials, corrections, strict=True)]
 
-    def _sought(
+    def _predict_or_nan(
         self, theta: Theta, trial: Record, corrections: Sequence[Correction], effects: tuple[str, ...]
     ) -> Channels:
         try:
@@ -340,14 +340,16 @@ class FunctionSystem(System):
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         given = self._nuisances
-        found = _told_by("nuisances", trial, lambda: several(given(trial), Parameter)) if callable(given) else given
+        found = (
+            _call_for_trial("nuisances", trial, lambda: several(given(trial), Parameter)) if callable(given) else given
+        )
         for p in found:
             if p.name in self._off or p.name in self._sites:
                 raise DeclarationError(f"trial {trial.name}: its nuisance {p.name} has the name of another parameter.")
         return found
 
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
-        found = _told_by(
+        found = _call_for_trial(
             "regressors",
             trial,
             lambda: {name: np.asarray(column) for name, column in self._regressors(trial, prediction).items()},
@@ -386,7 +388,7 @@ class FunctionSystem(System):
         return self._experiments
 
 
-def _told_by(what: str, trial: Record, ask: Callable[[], Any]) -> Any:
+def _call_for_trial(what: str, trial: Record, ask: Callable[[], Any]) -> Any:
     """Call a user's function for a trial. Raises MisuseError if it fails."""
     try:
         return ask()

@@ -6,7 +6,7 @@ import sys
 import time
 from typing import TextIO
 
-_QUIET_S = 2.0  # a shorter diagnosis shows nothing
+_MIN_SHOWN_S = 2.0  # a shorter diagnosis shows nothing
 _RACED = 6  # sets of each size that are fitted, apart from those whose score says little (at most one per effect)
 _FORMS = 6  # steps of trying an explanation with a learnt curve
 
@@ -24,16 +24,16 @@ class Progress:
 
     def __init__(self, effects: int, stream: TextIO | None = None):
         self._total, self._stream = most_steps(effects), stream or sys.stderr
-        self._begun, self._done, self._shown = time.monotonic(), 0, False
+        self._start_s, self._done, self._shown = time.monotonic(), 0, False
 
     def __call__(self, what: str) -> None:
-        gone = time.monotonic() - self._begun
+        elapsed_s = time.monotonic() - self._start_s
         self._done += 1
         self._total = max(self._total, self._done)
-        if gone < _QUIET_S:
+        if elapsed_s < _MIN_SHOWN_S:
             return
-        left = gone / max(self._done - 1, 1) * (self._total - self._done + 1)
-        line = f"{self._done} of at most {self._total}, {_clock(gone)} gone, at most {_clock(left)} left: {what}"
+        left = elapsed_s / max(self._done - 1, 1) * (self._total - self._done + 1)
+        line = f"{self._done} of at most {self._total}, {_clock(elapsed_s)} gone, at most {_clock(left)} left: {what}"
         if self._stream.isatty():
             self._stream.write(f"\r\x1b[K{line[:120]}")
         else:

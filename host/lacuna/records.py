@@ -22,8 +22,8 @@ from lacuna.values import plain
 
 TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # per second
 _LABELS = ("name", "experiment", "condition", "order")
-_FEWEST = 8  # samples in a window or segment
-_MOST_NAMED = 8  # columns listed in a message
+_MIN_SAMPLES = 8  # samples in a window or segment
+_MAX_LISTED = 8  # columns listed in a message
 _NUMERIC = b"0123456789+-.eE, \t\r\n"
 _TRUTHS = {"true": 1.0, "false": 0.0}
 
@@ -49,7 +49,7 @@ class Table:
         for output in outputs:
             if output not in self.columns:
                 raise RecordError(
-                    f"record {self.name} has no column {output}; it has {listed(self.columns, _MOST_NAMED)}."
+                    f"record {self.name} has no column {output}; it has {listed(self.columns, _MAX_LISTED)}."
                 )
         return Record(
             name=self.name,
@@ -74,9 +74,9 @@ def read(data: Any) -> list[Record | Table]:
       column `condition` says otherwise. Hidden files are ignored.
 
     The times are a column, or an index of pandas or xarray, called `time_s`, `time` or `t` (seconds), `time_ms` or
-    `time_us`; they may also be dates. Single values of a record, and its labels `condition` (records with an equal one
-    are repeats), `experiment` and `order` (position in the day), may be columns or entries of `attrs`. Columns are
-    copied; missing or masked samples become NaN, true and false become 1 and 0. Raises RecordError.
+    `time_us`, or dates (in a pandas index under any name). Single values, and the labels `condition` (records with an
+    equal one are repeats), `experiment` and `order` (position in the day), may be columns or entries of `attrs`.
+    Columns are copied; missing or masked samples become NaN, true and false become 1 and 0. Raises RecordError.
     """
     if isinstance(data, str | Path):
         return _folder(Path(data))
@@ -87,7 +87,7 @@ def read(data: Any) -> list[Record | Table]:
     if isinstance(data, Mapping):
         if data and all(isinstance(column, np.ndarray) for column in data.values()):
             raise RecordError(
-                f"a record of {listed(data, _MOST_NAMED)} has no times: give a column time_s, in seconds (for static"
+                f"a record of {listed(data, _MAX_LISTED)} has no times: give a column time_s, in seconds (for static"
                 " data, the row number)."
             )
         return [_table(one, str(name)) for name, one in data.items()]
@@ -143,7 +143,7 @@ def _of_columns(data: Any, name: str) -> Table:
         time_s = columns.pop(clock)
     if time_s is None:
         raise RecordError(
-            f"record {name} has no times: give a column time_s, in seconds. It has {listed(columns, _MOST_NAMED)}."
+            f"record {name} has no times: give a column time_s, in seconds. It has {listed(columns, _MAX_LISTED)}."
         )
     name = str(labels.get("name", name))
     singles = {str(n): value for n, value in attrs.items() if isinstance(value, Real | np.bool_ | str)}
@@ -289,7 +289,7 @@ def _refuse_settings(tables: Mapping[str, Table]) -> None:
         if len(found) > 1 and found not in (list(range(len(found))), list(range(1, len(found) + 1))):
             raise RecordError(
                 f"{condition}: files whose names differ only by a number at the end are taken for repeats, and these"
-                f" are numbered {listed(found, _MOST_NAMED)}, not 1 to {len(found)}. If the number is a setting, give"
+                f" are numbered {listed(found, _MAX_LISTED)}, not 1 to {len(found)}. If the number is a setting, give"
                 " each file a column `condition` of its own, and the setting a column; if they are repeats, give all"
                 " the same `condition`, or number them without a gap."
             )
@@ -447,8 +447,12 @@ def windows(
     time = table.time_s - table.time_s[0]
     sample = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
     every = seconds if every is None else every
-    asked = {"seconds": (seconds, _FEWEST), "every": (every, 1), "period": (seconds if period is None else period, 1)}
-    for what, (given, samples) in (asked | {"skip": (skip, 0)}).items():
+    limits = {
+        "seconds": (seconds, _MIN_SAMPLES),
+        "every": (every, 1),
+        "period": (seconds if period is None else period, 1),
+    }
+    for what, (given, samples) in (limits | {"skip": (skip, 0)}).items():
         if not isinstance(given, Real) or not samples * sample <= float(given) < np.inf:
             raise RecordError(f"record {table.name}: {what} is {given!r}; its samples are {sample:g} s apart.")
     starts = np.arange(skip, time[-1] - seconds + 1.5 * sample, every)
@@ -476,7 +480,7 @@ def segments(data: Any, count: int = 10) -> list[Table]:
     if not isinstance(count, int) or count < 3:
         raise RecordError(f"record {table.name}: {count!r} segments: give a whole number, 3 or more.")
     ends = np.linspace(0, len(table.time_s), count + 1).astype(int)
-    if len(table.time_s) < count * _FEWEST:
+    if len(table.time_s) < count * _MIN_SAMPLES:
         raise RecordError(f"record {table.name} has {len(table.time_s)} samples: too few for {count} segments.")
     found = []
     for place, (first, last) in enumerate(pairwise(ends)):
@@ -487,7 +491,7 @@ def segments(data: Any, count: int = 10) -> list[Table]:
     return found
 
 
-def falling(time_s: np.ndarray) -> str:
+def describe_reversal(time_s: np.ndarray) -> str:
     """Describe where times fail to increase; empty if they always do."""
     at = np.flatnonzero(~(time_s[1:] > time_s[:-1]))  # a difference of unsigned integers is never negative
     if not len(at):
@@ -502,7 +506,7 @@ def _part(table: Table, name: str) -> str:
     return f"{table.labels['name']}, {name}" if "name" in table.labels else name
 
 
-def stretched(table: Table, record: Record, outputs: Sequence[str]) -> Record:
+def attach_run(table: Table, record: Record, outputs: Sequence[str]) -> Record:
     """Attach to `record` the run that it is a stretch of, if `table` is a segment; otherwise return it unchanged."""
     if "stretch" not in table.labels:
         return record
@@ -517,10 +521,10 @@ def _along(column: Any, table: Table) -> bool:
 
 
 def _one_long(data: Any) -> Table:
-    """Read the single record that is to be cut. Raises RecordError if there are several or times do not increase."""
+    """Read the one table that is to be cut. Raises RecordError if there is not one, or times do not increase."""
     found = [one for one in read(data) if isinstance(one, Table)]
     if len(found) != 1:
         raise RecordError("give one long record to cut up.")
-    if said := falling(found[0].time_s):
-        raise RecordError(f"record {found[0].name}: {said}: sort it by time, or give its parts one by one.")
+    if fault := describe_reversal(found[0].time_s):
+        raise RecordError(f"record {found[0].name}: {fault}: sort it by time, or give its parts one by one.")
     return found[0]

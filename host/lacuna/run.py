@@ -21,9 +21,9 @@ from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.estimation.problem import usable_cores, use_threads
 from lacuna.function_system import FunctionSystem
-from lacuna.misfit import compared_at_misfit, left_over_s
+from lacuna.misfit import compare_at_misfit, residual_correlation_s
 from lacuna.progress import Progress
-from lacuna.records import Table, read, stretched
+from lacuna.records import Table, attach_run, read
 from lacuna.system import Record, System, several
 from lacuna.verdict import Verdict
 
@@ -61,23 +61,23 @@ def diagnose(
     - `progress`: a function called with a description of each step, or False for silence. The steps are also logged
       (`logging`, "lacuna").
 
-    Ctrl-C during the search ends it with the best result so far. Before the search, raises MisuseError, RecordError or
-    DeclarationError, naming trial and channel.
+    Ctrl-C during the search ends it with the best result so far. Raises MisuseError, RecordError or DeclarationError,
+    naming the trial; during the search only if the model fails.
     """
-    _check_how(starts, n_jobs, executor, policy, progress)
+    _check_arguments(starts, n_jobs, executor, policy, progress)
     seed = _seed("seed", seed) if random_state is None else _seed("random_state", random_state)
     suspects = several(suspected, str)
     if records is not None or not hasattr(system, "predict"):  # `with_records` reports that
         system = with_records(system, records)
     if names := several(test, str):
-        system = _tested_on(system, names)
+        system = _with_test(system, names)
     shown = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
 
     def reported(what: str) -> None:
         _log.info("%s: %s", system.name, what)
         shown(what)
 
-    system, in_steps = _in_steps(system)
+    system, in_steps = _detect_grains(system)
     try:
         with _workers(n_jobs, executor) as workers:
             answer = partial(
@@ -92,11 +92,11 @@ def diagnose(
             found = answer(system)
             raised: Mapping[tuple[str, str], float] = {}
             if isinstance(system, FunctionSystem):
-                if system.estimates_noise_time and any((left_s := left_over_s(found)).values()):
+                if system.estimates_noise_time and any((left_s := residual_correlation_s(found)).values()):
                     system = system.with_noise_time(left_s)
                     found = answer(system)
-                found, raised = compared_at_misfit(system, found, answer)
-            found = _cautioned(found, system, raised, answer)
+                found, raised = compare_at_misfit(system, found, answer)
+            found = _with_residual_warnings(found, system, raised, answer)
             found = replace(found, warnings=(*found.warnings, *in_steps))
     finally:
         if isinstance(shown, Progress):
@@ -106,7 +106,7 @@ def diagnose(
     return verdict
 
 
-def _check_how(starts: Any, n_jobs: Any, executor: Any, policy: Any, progress: Any) -> None:
+def _check_arguments(starts: Any, n_jobs: Any, executor: Any, policy: Any, progress: Any) -> None:
     """Raise MisuseError if an argument of `diagnose` is invalid."""
     if not _is_whole(starts, 1):
         raise MisuseError(f"starts is {starts!r}: give a whole number, 1 or more.")
@@ -138,7 +138,7 @@ def _seed(what: str, given: Any) -> int:
     return index(given)
 
 
-def _in_steps(system: System) -> tuple[System, list[str]]:
+def _detect_grains(system: System) -> tuple[System, list[str]]:
     """Return `system` with the step widths of parameters that act in steps, and a warning for each of them."""
     if not isinstance(system, FunctionSystem):
         return system, []
@@ -147,21 +147,21 @@ def _in_steps(system: System) -> tuple[System, list[str]]:
     except LacunaError:  # an error of the model, which the check reports more clearly
         return system, []
     said = [
-        f"{name} changes predictions only in steps, of about {_told_width(system, name, width):.2g}: let the model"
+        f"{name} changes predictions only in steps, of about {_user_width(system, name, width):.2g}: let the model"
         " interpolate between them, and it is fitted better."
         for name, width in grains.items()
     ]
     return system.with_grains(grains), said
 
 
-def _told_width(system: FunctionSystem, name: str, width: float) -> float:
+def _user_width(system: FunctionSystem, name: str, width: float) -> float:
     effect, _, own = name.rpartition(".")
     parameters = system.effects[effect].parameters if effect else system.parameters
     (value,) = (p.value for p in parameters if p.name == own)
     return abs(system.told(name, value + width) - system.told(name, value))
 
 
-def _tested_on(system: System, names: tuple[str, ...]) -> System:
+def _with_test(system: System, names: tuple[str, ...]) -> System:
     """Return `system` with these of its trials as the final test. Raises MisuseError."""
     known = {trial.name for trial in system.trials}
     for name in names:
@@ -172,7 +172,7 @@ def _tested_on(system: System, names: tuple[str, ...]) -> System:
     return system.with_test(names)
 
 
-def _cautioned(
+def _with_residual_warnings(
     found: Diagnosis, system: System, raised: Mapping[tuple[str, str], float], answer: Callable[[System], Diagnosis]
 ) -> Diagnosis:
     """Add warnings about the residual: if it is far above the floor, and if only a repeat or the user can tell whether
@@ -184,7 +184,7 @@ def _cautioned(
         f" {levels[experiment, channel].sd:.3g}, a fraction of the best one's residual."
         for (experiment, channel), floor in raised.items()
     ]
-    left_s = left_over_s(found) if found.left.matters and not raised else {}
+    left_s = residual_correlation_s(found) if found.left.matters and not raised else {}
     advised = {
         channel: float(f"{seconds:.2g}")
         for channel, seconds in left_s.items()
@@ -210,13 +210,13 @@ def with_records(system: System, records: Any) -> FunctionSystem:
     given = read(records)
     tables = [one for one in given if isinstance(one, Table)]
     outputs = system.outputs or (_outputs(system, tables[0]) if tables else ())
-    trials = [one if isinstance(one, Record) else stretched(one, one.record(outputs), outputs) for one in given]
+    trials = [one if isinstance(one, Record) else attach_run(one, one.record(outputs), outputs) for one in given]
     return system.with_trials(trials)
 
 
 def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
     """Find the names of the outputs by calling `simulate` on one record. Raises MisuseError."""
-    record = stretched(table, table.record(()), ())
+    record = attach_run(table, table.record(()), ())
     run = record.payload.run if record.payload else record
     theta = {p.name: p.value for p in (*system.parameters, *system.nuisances(record))}
     try:

@@ -26,7 +26,7 @@ class Values(dict[str, Any]):
             raise AttributeError(f"{name}: there are {', '.join(self)}")
         return Values(members)
 
-    def at_hand(self) -> Values:
+    def with_attributes(self) -> Values:
         """Return a copy with its entries as plain attributes, which are faster to read in loops over samples."""
         found, parts = Values(self), dict[str, Values]()
         for name, value in self.items():

@@ -16,7 +16,7 @@ from lacuna.errors import MisuseError
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.structure import is_learnt
 from lacuna.function_system import FunctionSystem
-from lacuna.records import read, stretched
+from lacuna.records import attach_run, read
 from lacuna.system import Record, System
 from lacuna.values import Values
 
@@ -26,8 +26,8 @@ class CompletedModel:
 
     `record` is anything that `diagnose` accepts as one record. `theta` maps parameters to values that replace the
     fitted ones, which are in `model.theta`. Nuisances have their expected values unless `theta` gives others. Returns
-    what `simulate` returns; for a segment of a longer record, only the segment's own samples. Raises MisuseError for
-    an unknown, fixed or tied parameter.
+    what `simulate` returns; for a segment of a longer record, only the segment's own samples. If the model is a
+    function, an unknown, fixed or tied parameter raises MisuseError.
     """
 
     def __init__(self, system: System, fitted: Fit):
@@ -69,7 +69,7 @@ def _one(record: Any, outputs: tuple[str, ...]) -> Record:
     found = given[0]
     if isinstance(found, Record):
         return found
-    return stretched(found, found.record([name for name in outputs if name in found.columns]), outputs)
+    return attach_run(found, found.record([name for name in outputs if name in found.columns]), outputs)
 
 
 class Verdict:
@@ -111,7 +111,7 @@ class Verdict:
         from lacuna.report.diagnosis import diagnosis_page
         from lacuna.report.page import render
 
-        return _written(path, render(diagnosis_page(self.system.name, self.record, self.diagnosis)))
+        return _write(path, render(diagnosis_page(self.system.name, self.record, self.diagnosis)))
 
     def to_frame(self, what: str = "parameters") -> Any:
         """Return a pandas DataFrame of the "parameters" of the completed model or of the explanations "compared".
@@ -127,7 +127,7 @@ class Verdict:
         """Write the verdict as JSON, to be read with `lacuna.load`, and return its path. The completed model itself is
         not saved: it is your function with the values in `theta`."""
         kept = {"system": self.system.name, "record": self.record, "theta": dict(self.theta), "text": str(self)}
-        return _written(path, json.dumps(kept, indent=1, default=float))
+        return _write(path, json.dumps(kept, indent=1, default=float))
 
     def plot(self) -> Any:
         """Return a Matplotlib figure: errors before and after, explanations tried, and the worst predicted held-out
@@ -167,7 +167,7 @@ def load(path: str | Path) -> SavedVerdict:
         raise MisuseError(f"{path} is not a verdict written by `Verdict.save`.") from error
 
 
-def _written(path: str | Path, text: str) -> Path:
+def _write(path: str | Path, text: str) -> Path:
     """Write `text` to `path` atomically and return the path."""
     path = Path(path)
     unfinished = path.with_name(path.name + ".unfinished")

@@ -185,7 +185,7 @@ bool Controller::tick(bool emergency_stop_pressed) {
     since_sample_ms_ = 0;
     begin_sample();
   }
-  watch_host();  // first, before anything that could open a valve
+  watch_host();  // before anything that could open a valve
   step_oscillators();
   follow_schedule();
   {

@@ -50,7 +50,7 @@ class SensorWatch {
     int16_t limit;
   };
 
-  /// `sum`: raw reading, `pressure_mpsi`: the same as a pressure, `chamber`: present state of its valves.
+  /// `sum`: raw reading, `pressure_mpsi`: the same as a pressure, `chamber`: what the chamber is commanded to.
   Finding look(uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi, ChamberState chamber);
 
   /// Whether the cause of a fault is present in this sample. A sample out of range rules nothing out.

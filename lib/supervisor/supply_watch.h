@@ -31,7 +31,7 @@ class DacWatch {
   bool failed_ = false;
 };
 
-/// The monitor is optional. It counts as connected once it has read its zero (1 V) or more.
+/// The monitor is optional. It counts as connected once it has read its zero (1 V) or more for a second.
 class RegulatorWatch {
  public:
   /// Call once per sample; returns whether the regulator has failed to follow for kMonitorTime_ms.

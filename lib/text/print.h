@@ -8,7 +8,7 @@ namespace bifa {
 void print(char character);
 void print(FlashText text);
 void print(const char* text);
-/// Prints a line feed and a carriage return, so that bare terminals start the next line at the margin; texts that
+/// Prints a carriage return and a line feed, so that bare terminals start the next line at the margin; texts that
 /// contain line ends have both, too.
 void print_line_end();
 

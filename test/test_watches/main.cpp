@@ -35,7 +35,7 @@ void test_over_pressure_trips_after_exactly_its_time_and_not_before() {
   TEST_ASSERT_TRUE(look(watch, kTrip_mpsi + 1) == Fault::kOverPressure);
 }
 
-/// Samples above the limit until a watch trips that has already seen `above` such samples and then `below` others.
+/// Samples above the limit that it takes to trip after `above` such samples and then `below` others.
 uint8_t samples_to_trip(uint8_t above, uint8_t below) {
   SensorWatch watch;
   for (; above > 0; --above) look(watch, kTrip_mpsi + 1);
@@ -114,7 +114,7 @@ void test_a_loose_plug_is_found_though_every_fifth_sample_is_good() {
   TEST_ASSERT_TRUE(fault == Fault::kSensorRange);
 }
 
-/// Samples out of range until a watch faults that has already seen 4 of them and then `good` good ones.
+/// Samples out of range that it takes to fault after 4 such samples and then `good` good ones.
 uint8_t lost_to_fault(uint8_t good) {
   SensorWatch watch;
   samples_of(watch, 4, 0, kUnplugged);

@@ -21,13 +21,13 @@ from bifa.campaign.stages import StageError
 from bifa.campaign.walks import predict, prediction_of, speed_of
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.files import write_text
-from bifa.gait.prediction import FELL
+from bifa.gait.prediction import MIN_SPEED_RATIO
 from bifa.robot import Model, load_model, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 
 ROUNDS = 3
-_PREDICTED = 0.005  # relative error of a predicted speed that is allowed even if the repeats agree more closely
-_UNCHANGED = 0.01  # relative difference of measured speeds that counts as none
+_PREDICTED_REL_TOL = 0.005  # relative error of a predicted speed that is allowed even if the repeats agree more closely
+_UNCHANGED_REL_TOL = 0.01  # relative difference of measured speeds that counts as none
 
 
 class Ending(StrEnum):
@@ -68,13 +68,13 @@ class Round:
         """Whether the speed is predicted to within two standard deviations of the repeats, or to half a per cent. A
         speed far below the prediction is not: the scatter of repeats of which some failed excuses no prediction."""
         error_mm_s = abs(self.predicted_mm_s - self.measured_mm_s)
-        return self.measured_mm_s >= FELL * self.predicted_mm_s and error_mm_s <= max(
-            2.0 * self.spread_mm_s, _PREDICTED * abs(self.measured_mm_s)
+        return self.measured_mm_s >= MIN_SPEED_RATIO * self.predicted_mm_s and error_mm_s <= max(
+            2.0 * self.spread_mm_s, _PREDICTED_REL_TOL * abs(self.measured_mm_s)
         )
 
     def changes_nothing(self, before: Round) -> bool:
         """Whether the model names the same effects as before and its gait is as fast and predicted no better."""
-        as_fast = abs(self.measured_mm_s - before.measured_mm_s) < _UNCHANGED * before.measured_mm_s
+        as_fast = abs(self.measured_mm_s - before.measured_mm_s) < _UNCHANGED_REL_TOL * before.measured_mm_s
         return self.effects == before.effects and as_fast and self.error_mm > 0.9 * before.error_mm
 
 
@@ -97,7 +97,7 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 
 
 @dataclass(frozen=True)
-class Trades:
+class RoundSteps:
     """The steps of a round.
 
     complete(dataset, suspected): diagnose all data, suspecting the effects named before; returns the completed model
@@ -145,7 +145,7 @@ def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
     return np.array(measured) - predicted
 
 
-def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...], trades: Trades) -> None:
+def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...], steps: RoundSteps) -> None:
     """Repeat rounds until a gait at the edge is predicted, nothing changes, no gait is expected to walk, or `ROUNDS` is
     reached.
 
@@ -165,7 +165,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
-        completed, named = trades.complete(dataset, effects)
+        completed, named = steps.complete(dataset, effects)
         # If nothing is named any more, the fits have gone wrong: the effects that explained the bench data are kept.
         if effects and not named:
             completed, named = model, effects
@@ -173,8 +173,8 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
         if folder.exists():
             walks = read_dataset(folder)
             found.append(Gait(**walks.trials[0].walked))
-        elif (gait := trades.optimize(completed, (*began, *found))) is not None:
-            walks = trades.walk(number, completed, gait, folder)
+        elif (gait := steps.optimize(completed, (*began, *found))) is not None:
+            walks = steps.walk(number, completed, gait, folder)
             found.append(gait)
         else:
             ended = Ending.FALLS

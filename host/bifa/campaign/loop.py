@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bifa.campaign.again import Trades, again
+from bifa.campaign.again import RoundSteps, again
 from bifa.campaign.before_and_after import prediction_errors, residuals
 from bifa.campaign.resolve import joined, resolve
 from bifa.campaign.setup import Effort, Setup, about
@@ -35,9 +35,9 @@ from lacuna.diagnosis.record import as_record
 
 BENCH_NAME = "campaign: characterisation"  # name of the data set `bench`
 AT_EDGE = 0.05  # share of the robots that need not walk with a gait at the edge
-_LIKELY = 0.5  # gaits at the edge with a lower probability of walking are not tried
-_SEPARATING = 10  # stage numbers of the rig: experiments that separate confusable effects count from here,
-_FURTHER = 20  # and the walks of further rounds from here
+_MIN_WALK_PROBABILITY = 0.5  # gaits at the edge with a lower probability of walking are not tried
+_SEPARATING_STAGE = 10  # stage numbers of the rig: experiments that separate confusable effects count from here,
+_ROUND_STAGE = 20  # and the walks of further rounds from here
 
 
 def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:
@@ -54,7 +54,7 @@ def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stag
         _diagnose(setup, on_progress),
         _optimize("completed", ("gait-base.toml",), setup, on_progress),
         _walk("completed", {"completed": "gait-completed.toml"}, 2, setup, effort, on_progress),
-        _again(setup, effort, on_progress),
+        _feed_back(setup, effort, on_progress),
     ]
     if setup.is_virtual:
         stages.append(_unseal(setup))
@@ -137,7 +137,7 @@ def gait_at_edge(robot: Model, seed: int, on_progress: OnProgress, walked: tuple
         best = found_gait(robot, seed, None, on_progress, walked)
     except SearchError:
         return None
-    return best.gait if best.prediction.walks_probability >= _LIKELY else None
+    return best.gait if best.prediction.walks_probability >= _MIN_WALK_PROBABILITY else None
 
 
 def found_gait(
@@ -176,13 +176,15 @@ def _walk(
     return Stage(name, title, needs, (walks,), run, settings, resumes=kept, by_hand=kept)
 
 
-def _diagnosed(setup: Setup, on_progress: OnProgress, dataset: Dataset, suspected: Collection[str] = ()) -> Diagnosis:
+def _run_diagnosis(
+    setup: Setup, on_progress: OnProgress, dataset: Dataset, suspected: Collection[str] = ()
+) -> Diagnosis:
     system, seed = prepare(dataset), setup.seed
     return diagnose(system, seed=seed, suspected=suspected, on_progress=lambda what: on_progress(spoken(what), 0.0))
 
 
 def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
-    diagnosed = partial(_diagnosed, setup, on_progress)
+    diagnosed = partial(_run_diagnosis, setup, on_progress)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
@@ -191,7 +193,12 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
         ran: tuple[NextExperiment, ...] = ()
         if not setup.is_by_hand:
             dataset, found, ran = resolve(
-                dataset, found, diagnosed, lambda n: setup.open(_SEPARATING + n), outputs / "separating", on_progress
+                dataset,
+                found,
+                diagnosed,
+                lambda n: setup.open(_SEPARATING_STAGE + n),
+                outputs / "separating",
+                on_progress,
             )
         record = as_record(found) | {"separated_by": [asdict(experiment) for experiment in ran]}
         del record["seconds"]  # the same seed gives the same bytes
@@ -201,19 +208,19 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
         save_model(outputs / "model-completed.toml", completed_model(found.final))
 
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
-    settings = setup.settings(_SEPARATING)
+    settings = setup.settings(_SEPARATING_STAGE)
     measures = not (setup.is_virtual or setup.is_by_hand)  # the separating experiments, on an unattended rig
     return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings, by_hand=measures)
 
 
-def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
+def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     def complete(dataset: Dataset, suspected: tuple[str, ...]) -> tuple[Model, tuple[str, ...]]:
-        found = _diagnosed(setup, on_progress, dataset, suspected)
+        found = _run_diagnosis(setup, on_progress, dataset, suspected)
         return completed_model(found.final), tuple(effect.name for effect in found.effects)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
-        with setup.open(_FURTHER + number) as rig:
+        with setup.open(_ROUND_STAGE + number) as rig:
             gaits, on_walk = {f"round-{number}": gait}, _unless_by_hand(setup, on_progress)
             return measure_walks(rig, folder, gaits, cycles, effort.repeats, on_walk, setup.hands)
 
@@ -222,13 +229,13 @@ def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
         for folder in sorted((inputs / "separating").iterdir()):
             dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
         named = json.loads((inputs / "diagnosis.json").read_text())["effects"]
-        trades = Trades(complete, lambda robot, walked: gait_at_edge(robot, setup.seed, on_progress, walked), walk)
-        again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), trades)
+        steps = RoundSteps(complete, lambda robot, walked: gait_at_edge(robot, setup.seed, on_progress, walked), walk)
+        again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), steps)
 
     walked = ("walks-base", "walks-completed")
     needs = ("bench", "separating", *walked, "diagnosis.json", "model-completed.toml", "gait-completed.toml")
     makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
-    settings = setup.settings(_FURTHER) | {"effort": asdict(effort)}
+    settings = setup.settings(_ROUND_STAGE) | {"effort": asdict(effort)}
     kept = not setup.is_virtual
     return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=kept, by_hand=kept)
 

@@ -56,7 +56,7 @@ FILES = (
     ("summary.json", "figures"),
     ("provenance.json", "provenance"),
 )
-_MANY = 0.1  # share of robots that do not walk from which the report says so
+_MIN_STANDING_SHARE = 0.1  # share of robots that do not walk from which the report says so
 _LONGEST_S = 20.0  # of an animation
 
 
@@ -76,16 +76,16 @@ def campaign_page(
     """
     verdict = verdict_sentence(summary["verdict"], summary["effects"], summary["remainder"])
     sections = [
-        _found(summary, diagnosis),
-        _off(summary, diagnosis, traces, labels),
+        _findings_section(summary, diagnosis),
+        _residuals_section(summary, diagnosis, traces, labels),
         *further(diagnosis, labels),
         walking(walks),
-        _gaits(summary, walks),
+        _gaits_section(summary, walks),
         rounds_section(summary["rounds"]),
     ]
     return Page(
         f"What {robot} does that the paper's model does not",
-        f"{verdict} {_faster(summary['gaits'])}",
+        f"{verdict} {_speed_sentences(summary['gaits'])}",
         sections,
         (
             f"{BASE_MODEL} {COMPLETED_MODEL} {RMS} {NOISE_FLOOR} {LOWERED} {HELD_OUT}",
@@ -97,7 +97,7 @@ def campaign_page(
     )
 
 
-def _faster(gaits: Sequence[Mapping[str, Any]]) -> str:
+def _speed_sentences(gaits: Sequence[Mapping[str, Any]]) -> str:
     measured = {gait["gait"]: gait["measured"] for gait in gaits}
     fastest = max(("completed", *(["edge"] if "edge" in measured else [])), key=lambda name: measured[name])
     times = measured[fastest] / measured["baseline"] if measured["baseline"] > 0 else float("inf")
@@ -105,10 +105,10 @@ def _faster(gaits: Sequence[Mapping[str, Any]]) -> str:
         f"The gait found with the completed model walks {measured[fastest]:.1f} mm/s, "
         f"{times:.1f} times as fast as the baseline."
     )
-    return f"{said} {_bought(measured['base'], measured[fastest])}"
+    return f"{said} {_gain_sentence(measured['base'], measured[fastest])}"
 
 
-def _bought(base_mm_s: float, completed_mm_s: float) -> str:
+def _gain_sentence(base_mm_s: float, completed_mm_s: float) -> str:
     """What completing the model gained on this robot."""
     if base_mm_s < STANDING_MM_S:
         return "With the gait found with the base model the robot stands still."
@@ -118,7 +118,7 @@ def _bought(base_mm_s: float, completed_mm_s: float) -> str:
     return f"That is {abs(gain):.0f} % {'faster' if gain > 0 else 'slower'} than with the base model."
 
 
-def _found(summary: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> ChartedSection:
+def _findings_section(summary: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> ChartedSection:
     effects, truth = summary["effects"], summary["truth"]
     said = found_sentences(effects) if effects else []
     for experiment in diagnosis.get("separated_by", []):
@@ -132,7 +132,7 @@ def _found(summary: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> ChartedS
     return ChartedSection("What was found", said, [effects_table(effects, truth)])
 
 
-def _off(
+def _residuals_section(
     summary: Mapping[str, Any],
     diagnosis: Mapping[str, Any],
     traces: Sequence[Mapping[str, Any]],
@@ -198,7 +198,7 @@ def _ahead(miss_mm: float) -> str:
     return f"{abs(miss_mm):.1f} mm {'ahead' if miss_mm > 0 else 'behind'}"
 
 
-def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSection:
+def _gaits_section(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSection:
     robots = len(next(iter(summary["robustness"].values())))
     standing = {name: standing_share(speeds) for name, speeds in summary["robustness"].items()}
     said = [
@@ -209,7 +209,7 @@ def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSect
         f"On robots almost identical to this one the {walks[name].title} often does not walk at all: "
         f"{100 * share:.0f} % of {robots} robots whose parameters differ by 2 % stay below {STANDING_MM_S} mm/s."
         for name, share in standing.items()
-        if share >= _MANY
+        if share >= _MIN_STANDING_SHARE
     ]
     rows = [
         [
@@ -230,7 +230,7 @@ def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSect
     return ChartedSection("The gaits", said, [table], charts)
 
 
-_ENDED = {
+_ENDING_TEXT = {
     Ending.PREDICTED: "the speed of its gait is predicted to within the scatter of repeats, or to half a per cent",
     Ending.UNCHANGED: "it names the same effects as the previous round; its gait is as fast and predicted no better",
     Ending.FALLS: "with its walks added to the data, the model finds no further gait that it expects to walk",
@@ -261,7 +261,7 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
         "robot, and so are nearer the edge beyond which it does not walk. Between rounds the walks are added to the "
         "data, the diagnosis is repeated with all data, and the next round walks the gait of the resulting model.",
         *(f"Round {number}: {_round_words(one)}." for number, one in enumerate(rounds, 1)),
-        f"The rounds ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
+        f"The rounds ended after round {len(rounds)}: {_ENDING_TEXT[rounds[-1]['ended']]}.",
     ]
     return ChartedSection("Gaits that were not fitted", said, [PageTable(columns, rows, caption)])
 

@@ -26,7 +26,7 @@ OnProgress = Callable[[str, float], None]  # current step of the running stage, 
 
 PROVENANCE = "provenance.json"
 _SCRATCH = ".scratch"
-_ASKED = "asked.json"  # in the scratch folder: what the stage was started with and, once it has ended, what it made
+_REQUEST_FILE = "asked.json"  # in the scratch folder: what the stage was started with and, once ended, what it made
 
 
 class StageError(BifaError):
@@ -61,13 +61,13 @@ def digest(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files and their names, sorted. Of a data set only the files it lists and the
     instruments' raw records of them count; files left by operating systems or office programs never do."""
     if path.is_dir():
-        lines = (f"{file.relative_to(path).as_posix()}\0{digest(file)}\n" for file in sorted(_that_count(path)))
+        lines = (f"{file.relative_to(path).as_posix()}\0{digest(file)}\n" for file in sorted(_counted_files(path)))
         return hashlib.sha256("".join(lines).encode()).hexdigest()
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _that_count(folder: Path) -> list[Path]:
+def _counted_files(folder: Path) -> list[Path]:
     from bifa.data.layout import RAW, TABLE_FILE  # imports numpy, which usage errors need not wait for
 
     files = [path for path in folder.rglob("*") if path.is_file() and not is_stray(path.name)]
@@ -119,10 +119,10 @@ def run_stages(
         shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
         for stage in stages:
             on_start(stage)
-            asked = _asked(folder, stage)
-            ran = stage.name in again or not _holds(folder, stage, asked, records.get(stage.name))
+            request = _request(folder, stage)
+            ran = stage.name in again or not _is_current(folder, stage, request, records.get(stage.name))
             if ran:
-                _run(folder, stage, asked, records)
+                _run(folder, stage, request, records)
             on_end(stage, ran)
 
 
@@ -137,7 +137,7 @@ def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict[st
             )
 
 
-def _asked(folder: Path, stage: Stage) -> dict[str, Any]:
+def _request(folder: Path, stage: Stage) -> dict[str, Any]:
     missing = [name for name in stage.needs if not (folder / name).exists()]
     if missing:
         raise StageError(f"stage {stage.name} needs {', '.join(missing)} in {folder}: run the earlier stages first")
@@ -148,20 +148,20 @@ def _asked(folder: Path, stage: Stage) -> dict[str, Any]:
     }
 
 
-def _holds(folder: Path, stage: Stage, asked: dict[str, Any], record: dict[str, Any] | None) -> bool:
+def _is_current(folder: Path, stage: Stage, request: dict[str, Any], record: dict[str, Any] | None) -> bool:
     if record is None:
         return False
     made = record.get("artefacts", {})
     other = [n for n in stage.makes if not (folder / n).exists() or made.get(n) != digest(folder / n)]
     intact = not other
     if not stage.by_hand:
-        return intact and all(record.get(key) == value for key, value in asked.items())
-    if intact and (differing := _differing(record.get("settings", {}), asked["settings"])):
+        return intact and all(record.get(key) == value for key, value in request.items())
+    if intact and (differing := _differing(record.get("settings", {}), request["settings"])):
         raise StageError(
             f"{', '.join(stage.makes)} in {folder} was measured with {', '.join(differing)}: use the same "
             f"settings, choose another folder, or measure again with --rerun {stage.name}"
         )
-    same_inputs = record.get("inputs") == asked["inputs"]
+    same_inputs = record.get("inputs") == request["inputs"]
     if other and same_inputs and not _unfinished(folder, stage).exists():
         raise StageError(
             f"{', '.join(other)} in {folder} is not what the stage {stage.name} measured (a file has changed or is "
@@ -181,17 +181,17 @@ def _differing(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     return sorted(found)
 
 
-def _run(folder: Path, stage: Stage, asked: dict[str, Any], records: dict[str, Any]) -> None:
+def _run(folder: Path, stage: Stage, request: dict[str, Any], records: dict[str, Any]) -> None:
     """Run the stage, record its artefacts, and move them into place, in this order: an interruption in between then
     leaves nothing in the folder that is not on record, and the digests show that the artefacts are not in place yet."""
     scratch = _unfinished(folder, stage)
-    begun = _resumed(scratch, stage, asked)
+    begun = _resumed(scratch, stage, request)
     scratch.mkdir(exist_ok=stage.resumes)
     done = False
     try:
-        made = _made_before(folder, scratch, stage, begun) or _made(folder, scratch, stage, asked)
+        made = _leftover_digests(folder, scratch, stage, begun) or _make(folder, scratch, stage, request)
         _refuse_unrecorded(folder, stage, records)
-        records[stage.name] = asked | {"artefacts": made}
+        records[stage.name] = request | {"artefacts": made}
         _write_json(folder / PROVENANCE, {"bifa": bifa.__version__, "stages": records})
         for name in stage.makes:
             if (scratch / name).exists():
@@ -206,21 +206,21 @@ def _unfinished(folder: Path, stage: Stage) -> Path:
     return folder / (f".{stage.name}-unfinished" if stage.resumes else _SCRATCH)
 
 
-def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, Any]:
+def _resumed(scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, Any]:
     """Return what the scratch folder to resume was started with; empty for a new one. If that differs from what is now
     asked for, StageError is raised for a stage done by hand; otherwise the folder is deleted, as is one whose artefacts
     were all moved."""
     if not stage.resumes or not scratch.exists():
         return {}
-    asked_before = scratch / _ASKED  # missing after an earlier version, or an interruption at the very start
-    begun = dict(json.loads(asked_before.read_text(encoding="utf-8"))) if asked_before.exists() else {}
+    request_path = scratch / _REQUEST_FILE  # missing after an earlier version, or an interruption at the very start
+    begun = dict(json.loads(request_path.read_text(encoding="utf-8"))) if request_path.exists() else {}
     moved = "artefacts" in begun and not any((scratch / name).exists() for name in stage.makes)
-    if moved or not (stage.by_hand or {key: begun.get(key) for key in asked} == asked):
+    if moved or not (stage.by_hand or {key: begun.get(key) for key in request} == request):
         shutil.rmtree(scratch)
         return {}
-    differing = _differing(begun.get("settings", {}), asked["settings"])
+    differing = _differing(begun.get("settings", {}), request["settings"])
     old = begun.get("inputs", {})
-    differing += [f"another {name}" for name, now in asked["inputs"].items() if name in old and old[name] != now]
+    differing += [f"another {name}" for name, now in request["inputs"].items() if name in old and old[name] != now]
     if differing:
         trials = trials_in(scratch)
         held = f"holds {counted(trials, 'trial')} of the stage {stage.name}, begun"
@@ -238,22 +238,22 @@ def trials_in(scratch: Path) -> int:
     return len(list(scratch.glob(f"**/*{PARTIAL_SUFFIX}/*.csv")))
 
 
-def _made_before(folder: Path, scratch: Path, stage: Stage, begun: Mapping[str, Any]) -> dict[str, str]:
+def _leftover_digests(folder: Path, scratch: Path, stage: Stage, begun: Mapping[str, Any]) -> dict[str, str]:
     """Digests of what an earlier run made but did not finish moving; empty if there is nothing."""
     made = begun.get("artefacts", {})
     here = all((scratch / name).exists() or (folder / name).exists() for name in stage.makes)
     return made if here and set(stage.makes) == set(made) else {}
 
 
-def _made(folder: Path, scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, str]:
+def _make(folder: Path, scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, str]:
     """Run the stage, unless an interrupted run has made all artefacts; return their digests."""
-    _write_json(scratch / _ASKED, asked)
+    _write_json(scratch / _REQUEST_FILE, request)
     if _missing(scratch, stage):
         stage.run(folder, scratch)
     if missing := _missing(scratch, stage):
         raise StageError(f"stage {stage.name} ended without making {', '.join(missing)}")
     made = {name: digest(scratch / name) for name in stage.makes}
-    _write_json(scratch / _ASKED, asked | {"artefacts": made})
+    _write_json(scratch / _REQUEST_FILE, request | {"artefacts": made})
     return made
 
 
@@ -264,13 +264,13 @@ def _missing(scratch: Path, stage: Stage) -> list[str]:
 def _replace(new: Path, target: Path, keep: bool) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     if keep and target.exists():
-        os.replace(target, _earlier(target))
+        os.replace(target, _backup_path(target))
     if target.is_dir():
         shutil.rmtree(target)
     os.replace(new, target)
 
 
-def _earlier(target: Path) -> Path:
+def _backup_path(target: Path) -> Path:
     """Name under which `target` is kept: numbered one above the highest, even if lower numbers are missing."""
     there = target.parent.glob(f"{glob.escape(target.name)}.earlier-*")
     numbers = [path.name.rpartition("-")[2] for path in there]

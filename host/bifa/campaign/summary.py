@@ -84,7 +84,13 @@ def _run(robot: str, made: Sequence[tuple[str, str]], inputs: Path, outputs: Pat
     (outputs / "walk.svg").write_text(motion_of(most_missed(walks), standalone=True)[0], encoding="utf-8")
     measured = read_dataset(inputs / "bench")
     page = campaign_page(
-        summary, diagnosis, traces, walks, labels_of(measured), robot, [*_when(measured), *made, _versions()]
+        summary,
+        diagnosis,
+        traces,
+        walks,
+        labels_of(measured),
+        robot,
+        [*_measurement_info(measured), *made, _versions()],
     )
     write_page(page, outputs / "report.html")
 
@@ -117,7 +123,7 @@ def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -
     }
 
 
-def _when(measured: Dataset) -> list[tuple[str, str]]:
+def _measurement_info(measured: Dataset) -> list[tuple[str, str]]:
     """When the data were measured, by the date of the file, and with which firmware."""
     day = datetime.fromtimestamp((measured.folder / "dataset.toml").stat().st_mtime).date().isoformat()
     firmware = measured.provenance.get("firmware")

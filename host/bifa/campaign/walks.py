@@ -10,7 +10,7 @@ import numpy as np
 from bifa.campaign.stages import OnProgress
 from bifa.data import Dataset, Trial
 from bifa.gait.prediction import Prediction, predict_speed, settles
-from bifa.gait.settling import LEAST, MOST_CYCLES, MeasuredSpeed, Walking, complete_cycles, measured_speed
+from bifa.gait.settling import MAX_CYCLES, MIN_CYCLES, MeasuredSpeed, Walking, complete_cycles, measured_speed
 from bifa.gait.uncertainty import spread_of
 from bifa.link import Uno
 from bifa.measure.plan import PlannedTrial, walks
@@ -35,7 +35,7 @@ def measure_walks(
     set `folder`, whose files are named after the gaits. Walks left there by an interrupted run are not repeated.
 
     record: None on an unattended rig; a walk that has not settled is then repeated for twice as long, up to
-    `MOST_CYCLES`.
+    `MAX_CYCLES`.
     """
     each = cycles if isinstance(cycles, Mapping) else dict.fromkeys(gaits, cycles)
     trials = [
@@ -54,21 +54,21 @@ def measure_walks(
 
 
 def _until_settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
-    """`Recorder` of an unattended rig: repeat the walk for longer until it has settled or lasts `MOST_CYCLES`."""
+    """`Recorder` of an unattended rig: repeat the walk for longer until it has settled or lasts `MAX_CYCLES`."""
     while True:
         trial = unattended(rig, uno, planned, on_progress)
-        short = planned.cycles < LEAST
-        if short or planned.cycles >= MOST_CYCLES or speed_of(trial).walking is not Walking.UNSETTLED:
+        short = planned.cycles < MIN_CYCLES
+        if short or planned.cycles >= MAX_CYCLES or speed_of(trial).walking is not Walking.UNSETTLED:
             return trial
-        planned = replace(planned, cycles=min(2 * planned.cycles, MOST_CYCLES))
+        planned = replace(planned, cycles=min(2 * planned.cycles, MAX_CYCLES))
 
 
 def planned_cycles(model: Model, gait: Gait, least: int) -> int:
     """Number of cycles to walk, at least `least`, by the model's prediction: near the edge a robot may hardly move for
     several cycles before it walks, so the first ones say little; one that never settles may fail after many."""
     if not settles(model):
-        return MOST_CYCLES
-    return int(np.clip(predict_speed(model, spread_of(model), gait).cycles, least, MOST_CYCLES))
+        return MAX_CYCLES
+    return int(np.clip(predict_speed(model, spread_of(model), gait).cycles, least, MAX_CYCLES))
 
 
 def speed_of(trial: Trial) -> MeasuredSpeed:
@@ -85,7 +85,7 @@ def prediction_of(model: Model, trial: Trial, naive: bool = False) -> Prediction
     """Predict the walk in `trial`, of which only the gait, the length and the clock rate are used; naive: from the
     model's covariance alone."""
     known, gait = spread_of(model), Gait(**trial.walked)
-    cycles = max(complete_cycles(trial.time_s, gait.period_s), LEAST)  # with fewer, `speed_of` raises
+    cycles = max(complete_cycles(trial.time_s, gait.period_s), MIN_CYCLES)  # with fewer, `speed_of` raises
     rate = seconds_per_uno_s(trial)
     return predict_speed(model, known.naive if naive else known, gait, cycles=cycles, clock_rate=rate)
 

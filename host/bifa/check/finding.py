@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-LEAST = 3  # smallest number of findings that are merged
+MIN_MERGED = 3  # smallest number of findings that are merged
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)")  # separate numbers, not those in a file's name
 
 
@@ -34,7 +34,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Gathered:
+class MergedFinding:
     """Merged findings: the `text` shown to the user, and the `places` of the findings (empty for a single one)."""
 
     kind: str
@@ -42,18 +42,18 @@ class Gathered:
     places: tuple[str, ...] = ()
 
 
-def gathered(findings: Sequence[Finding]) -> Iterator[Gathered]:
+def merge_findings(findings: Sequence[Finding]) -> Iterator[MergedFinding]:
     """Merge findings that differ only in numbers and place; yields them in order of first appearance."""
     alike: dict[tuple[str, str | None, str], list[Finding]] = {}
     for finding in findings:
         alike.setdefault((finding.kind, finding.column, _NUMBER.sub("", finding.text)), []).append(finding)
     for group in alike.values():
-        if len(group) < LEAST or not all(finding.place for finding in group):
-            yield from (Gathered(finding.kind, str(finding)) for finding in group)
+        if len(group) < MIN_MERGED or not all(finding.place for finding in group):
+            yield from (MergedFinding(finding.kind, str(finding)) for finding in group)
             continue
         column = f", {group[0].column}" if group[0].column else ""
-        text = f"{_count(group)}{column}: {_in_one([finding.text for finding in group])}"
-        yield Gathered(group[0].kind, text, tuple(finding.place for finding in group))
+        text = f"{_count(group)}{column}: {_merge_texts([finding.text for finding in group])}"
+        yield MergedFinding(group[0].kind, text, tuple(finding.place for finding in group))
 
 
 def _count(group: Sequence[Finding]) -> str:
@@ -61,10 +61,10 @@ def _count(group: Sequence[Finding]) -> str:
     return f"{len(places)} {'trials' if group[0].file else 'conditions'}"
 
 
-def _in_one(texts: Sequence[str]) -> str:
+def _merge_texts(texts: Sequence[str]) -> str:
     """Merge texts that differ only in their numbers, giving the lowest and the highest value of each number."""
     numbers = zip(*(_NUMBER.findall(text) for text in texts), strict=True)
     words = _NUMBER.split(texts[0])
     spans = [sorted(set(slot), key=float) for slot in numbers]
-    said = [span[0] if len(span) == 1 else f"{span[0]} to {span[-1]}" for span in spans]
-    return "".join(word + number for word, number in zip(words, [*said, ""], strict=True))
+    ranges = [span[0] if len(span) == 1 else f"{span[0]} to {span[-1]}" for span in spans]
+    return "".join(word + number for word, number in zip(words, [*ranges, ""], strict=True))

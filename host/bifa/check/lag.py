@@ -44,7 +44,7 @@ def displacement_lag(trial: Trial) -> Lag | None:
 
     time_s, motion = trial.time_s, CubicSpline(trial.time_s, length_mm(trial))
     pressure_psi = trial.columns["pressure_psi" if trial.experiment == "step_response" else "pressure_body_psi"]
-    found = [_of_snap(time_s[k], motion, pressure_psi[k]) for k in _snaps(time_s, motion(time_s, 1))]
+    found = [_fit_snap_lag(time_s[k], motion, pressure_psi[k]) for k in _snaps(time_s, motion(time_s, 1))]
     pairs = np.array([pair for pair in found if pair is not None])
     if not len(pairs):
         return None
@@ -58,7 +58,7 @@ def misfit(lag: Lag, others: Sequence[Lag] = ()) -> str | None:
     """Describe how a trial's lag deviates from that of the session's other trials or, if there are none, from zero;
     None if it fits."""
     if not others:
-        return shift_of_all([lag])
+        return session_misfit([lag])
     usual_s = float(np.median([other.late_s for other in others]))
     if abs(lag.late_s - usual_s) <= max(LIMIT_S, 5.0 * lag.sd_s):
         return None
@@ -68,7 +68,7 @@ def misfit(lag: Lag, others: Sequence[Lag] = ()) -> str | None:
     )
 
 
-def shift_of_all(lags: Sequence[Lag]) -> str | None:
+def session_misfit(lags: Sequence[Lag]) -> str | None:
     """Describe what is wrong with the lag common to a session's trials; None if nothing is."""
     usual_s = float(np.median([lag.late_s for lag in lags])) if lags else 0.0
     if abs(usual_s) <= LIMIT_OF_ALL_S:
@@ -79,7 +79,7 @@ def shift_of_all(lags: Sequence[Lag]) -> str | None:
     )
 
 
-def misfit_of(trial: Trial, earlier: Sequence[Trial]) -> str | None:
+def trial_misfit(trial: Trial, earlier: Sequence[Trial]) -> str | None:
     """Describe how a trial's lag deviates from that of `earlier` trials, with its file name; None if it fits."""
     last = displacement_lag(trial)
     if last is None:
@@ -115,7 +115,7 @@ def _snaps(time_s: np.ndarray, speed_mm_s: np.ndarray) -> list[slice]:
     return windows
 
 
-def _of_snap(time_s: np.ndarray, motion: Motion, pressure_psi: np.ndarray) -> tuple[float, float] | None:
+def _fit_snap_lag(time_s: np.ndarray, motion: Motion, pressure_psi: np.ndarray) -> tuple[float, float] | None:
     """Least-squares estimate of the lag and its standard deviation [s]; None if the speed does not explain the bump."""
     slow, _ = np.linalg.qr(np.vander(time_s - time_s.mean(), _CURVATURE))
     late_s = np.arange(-REACH_S, REACH_S + _STEP_S / 2, _STEP_S)

@@ -32,7 +32,7 @@ def check_mirror(trial: Trial) -> Iterator[Finding]:
     """Yield a finding for a walk whose length shrinks while the body is filled. Without any snap-through, a walk is
     judged only if the tail was tracked too."""
     mm = shortens_mm(trial)
-    if not mm or not _is_turned(trial):
+    if not mm or not _is_mirrored(trial):
         return
     if _TAIL in trial.columns:
         text = (
@@ -47,10 +47,10 @@ def check_mirror(trial: Trial) -> Iterator[Finding]:
     yield Finding("mirrored", text, trial.file, column="displacement_head_mm")
 
 
-def _is_turned(trial: Trial) -> bool:
+def _is_mirrored(trial: Trial) -> bool:
     columns = trial.columns
-    turned = {name: -values for name, values in columns.items() if name.startswith("displacement")}
-    as_it_is, other_way = _snaps(trial), _snaps(replace(trial, columns=columns | turned))
+    mirrored = {name: -values for name, values in columns.items() if name.startswith("displacement")}
+    as_it_is, other_way = _snaps(trial), _snaps(replace(trial, columns=columns | mirrored))
     if as_it_is or other_way:
         return other_way > as_it_is
     share = follow(columns["command_body"], columns["pressure_body_psi"], trial.time_s)

@@ -11,13 +11,13 @@ from bifa.data.layout import is_command
 from bifa.data.lost import codes, held, runs
 
 from .finding import Finding
-from .lag import displacement_lag, misfit, shift_of_all
+from .lag import displacement_lag, misfit, session_misfit
 
 SENSOR_SPAN_PSI = 15.0  # Honeywell ABP...015PD: +-15 psi; beyond it the output is not specified
 ADC_LIMITS_PSI = (-18.75, 18.75)  # counts 0 and 1023, since 10-90 % of the supply span 30 psi
 REPEATS_WANTED = 3  # as in the paper's section IV
 MOTION_MM = 1.0  # every experiment moves by more than this (strokes of 30 and 54 mm)
-FLAT_SAMPLES = 8  # repetitions of an extreme value, in a channel that otherwise never repeats a value
+FLAT_SAMPLES = 8  # repetitions in a row of an extreme value, in a channel that otherwise hardly repeats a value
 SPIKE_MM = 5.0  # there and back within two samples; a snap-through does not come back
 
 
@@ -191,7 +191,7 @@ def _lags(dataset: Dataset) -> Iterator[Finding]:
         others = [other for name, other in lags.items() if name != file]
         if others and (text := misfit(lag, others)):
             yield Finding("lag", text, file)
-    if text := shift_of_all(list(lags.values())):
+    if text := session_misfit(list(lags.values())):
         yield Finding("lag", f"median of the {len(lags)} trials that show it: {text}")
 
 

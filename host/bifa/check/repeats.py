@@ -17,10 +17,11 @@ from bifa.data import Dataset, Trial
 from bifa.data.layout import is_command
 
 # Limits of the RMS difference, as a share of a channel's range. Healthy: 0.08 at most, if areas drift or sensors warm.
-_UNLIKE = 0.10
-_UNLIKE_OF_TWO = 0.20  # for two repeats, which do not show which of them is wrong
-_OF_OTHERS = 4.0  # in units of the others' difference from one another
-_OF_DAY = 5.0  # in units of the day's usual difference between repeats of this experiment: a lab's ordinary scatter
+_MAX_DIFFERENCE = 0.10
+_MAX_PAIR_DIFFERENCE = 0.20  # for two repeats, which do not show which of them is wrong
+_MAX_OTHERS_RATIO = 4.0  # in units of the others' difference from one another
+# In units of the day's usual difference between repeats of this experiment: a lab's ordinary scatter.
+_MAX_USUAL_RATIO = 5.0
 _POINTS = 400
 _LENGTH = "displacement_head_mm - displacement_tail_mm"
 
@@ -29,20 +30,21 @@ Curve = tuple[np.ndarray, np.ndarray]  # increasing abscissae, and the values th
 
 @dataclass(frozen=True)
 class _Group:
-    """Repeats of a condition: `apart[channel]`, shape (n, n), their RMS differences as shares of `ranges[channel]`."""
+    """Repeats of a condition: `differences[channel]`, shape (n, n), their RMS differences as shares of
+    `ranges[channel]`."""
 
     trials: Sequence[Trial]
-    apart: dict[str, np.ndarray]
+    differences: dict[str, np.ndarray]
     ranges: dict[str, float]
 
 
 def check_repeats(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
     """Yield a finding for each repeat unlike the others. `skipped`: files with a known mistake, left out."""
     kept = [[trial for trial in group if trial.file not in skipped] for group in dataset.repeats()]
-    groups = [_compared(group) for group in kept if len(group) > 1]
+    groups = [_compare(group) for group in kept if len(group) > 1]
     for group in groups:
         usual = _usual(group, groups)
-        yield from _of_two(group, usual) if len(group.trials) == 2 else _of_more(group, usual)
+        yield from _check_pair(group, usual) if len(group.trials) == 2 else _check_group(group, usual)
 
 
 def check_copies(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
@@ -60,16 +62,16 @@ def check_copies(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Fi
                 break
 
 
-def _of_more(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
+def _check_group(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
     """Findings in groups of three and more. A repeat counts as different only if even the nearest other one is far
     away: if two of five agree with each other, neither is a mistake."""
     for place, trial in enumerate(group.trials):
         others = [k for k in range(len(group.trials)) if k != place]
         found = []
-        for channel, apart in group.apart.items():
-            alike = float(np.median([min(apart[k, j] for j in others if j != k) for k in others]))
-            far = float(apart[place, others].min())
-            if far > max(_UNLIKE, _OF_OTHERS * alike, _OF_DAY * usual[channel]):
+        for channel, differences in group.differences.items():
+            alike = float(np.median([min(differences[k, j] for j in others if j != k) for k in others]))
+            far = float(differences[place, others].min())
+            if far > max(_MAX_DIFFERENCE, _MAX_OTHERS_RATIO * alike, _MAX_USUAL_RATIO * usual[channel]):
                 found.append((far, alike, channel))
         if found:
             far, alike, channel = max(found)
@@ -82,10 +84,12 @@ def _of_more(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
             yield Finding("repeat", text, trial.file, column=channel)
 
 
-def _of_two(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
+def _check_pair(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
     one, other = group.trials
-    found = [(float(apart[0, 1]), channel) for channel, apart in group.apart.items()]
-    found = [(far, channel) for far, channel in found if far > max(_UNLIKE_OF_TWO, _OF_DAY * usual[channel])]
+    found = [(float(differences[0, 1]), channel) for channel, differences in group.differences.items()]
+    found = [
+        (far, channel) for far, channel in found if far > max(_MAX_PAIR_DIFFERENCE, _MAX_USUAL_RATIO * usual[channel])
+    ]
     if found:
         far, channel = max(found)
         text = (
@@ -97,29 +101,29 @@ def _of_two(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
 
 def _usual(group: _Group, groups: Sequence[_Group]) -> dict[str, float]:
     """Median difference between repeats in the experiment's other conditions, by channel; 0 if there are none."""
-    found: dict[str, list[float]] = {channel: [] for channel in group.apart}
+    found: dict[str, list[float]] = {channel: [] for channel in group.differences}
     for other in groups:
         if other is not group and other.trials[0].experiment == group.trials[0].experiment:
-            for channel in found.keys() & other.apart.keys():
-                found[channel].extend(other.apart[channel][np.triu_indices(len(other.trials), 1)])
+            for channel in found.keys() & other.differences.keys():
+                found[channel].extend(other.differences[channel][np.triu_indices(len(other.trials), 1)])
     return {channel: float(np.median(values)) if values else 0.0 for channel, values in found.items()}
 
 
-def _compared(trials: Sequence[Trial]) -> _Group:
+def _compare(trials: Sequence[Trial]) -> _Group:
     curves = [_curves(trial) for trial in trials]
     channels = set.intersection(*(set(found) for found in curves))
     ranges = {c: float(np.median([max(np.ptp(v) for _, v in found[c]) for found in curves])) for c in channels}
-    apart = {}
+    differences = {}
     for channel in sorted(c for c in channels if ranges[c] > 0.0):
-        apart[channel] = np.zeros((len(trials), len(trials)))
+        differences[channel] = np.zeros((len(trials), len(trials)))
         for i in range(len(trials)):
             for j in range(i):
-                far = _apart(curves[i][channel], curves[j][channel]) / ranges[channel]
-                apart[channel][i, j] = apart[channel][j, i] = far
-    return _Group(trials, apart, ranges)
+                far = _rms_difference(curves[i][channel], curves[j][channel]) / ranges[channel]
+                differences[channel][i, j] = differences[channel][j, i] = far
+    return _Group(trials, differences, ranges)
 
 
-def _apart(one: Sequence[Curve], other: Sequence[Curve]) -> float:
+def _rms_difference(one: Sequence[Curve], other: Sequence[Curve]) -> float:
     """RMS difference over the range where both were recorded."""
     squares, spans = [], []
     for (at_one, values_one), (at_other, values_other) in zip(one, other, strict=True):

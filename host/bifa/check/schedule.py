@@ -13,7 +13,7 @@ from bifa.robot.cpg import CHAMBERS, COUPLING_PER_S
 # A record at 100 Hz resolves a phase to 0.2 % of a cycle of 4 s; the Uno's resonator is good to 0.5 %.
 _PERIOD_SHARE = 0.02
 _CYCLE_SHARE = 0.05  # for duties and phases
-_SETTLED = 5.0  # time constants of the coupling, after which the phases are those of the gait
+_SETTLING_TIME_CONSTANTS = 5.0  # time constants of the coupling, after which the phases are those of the gait
 
 Turns = TypeVar("Turns", float, np.ndarray)
 
@@ -23,8 +23,8 @@ _DUTIES = {chamber: f"duty_{chamber}" for chamber in CHAMBERS}
 
 def check_gait(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
     """Yield a finding if the commands contradict the gait. `walks`: the day's others, whose gait they may match."""
-    seen = seen_gait(trial, trial.columns)
-    wrong = contradicted(trial.walked, seen)
+    seen = estimate_gait(trial, trial.columns)
+    wrong = differing_parameters(trial.walked, seen)
     if wrong:
         values = ", ".join(f"{name} = {_written(name, seen[name])}" for name in wrong)
         given = ", ".join(f"{trial.walked[name]:g}" for name in wrong)
@@ -32,7 +32,7 @@ def check_gait(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
         yield Finding("gait", f"{text}: {_why(trial, seen, wrong, walks)}", trial.file)
 
 
-def seen_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, float]:
+def estimate_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Estimate gait parameters from the columns `command_body` ..., by name; phases are in 0 to 360 degrees."""
     time_s = trial.time_s * trial.extra.get("clock_rate", 1.0)  # by the Uno's clock, as the gait is
     falls, rises = {}, {}
@@ -41,21 +41,21 @@ def seen_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, flo
         middle_s = 0.5 * (time_s[1:] + time_s[:-1])
         falls[chamber], rises[chamber] = middle_s[step < 0], middle_s[step > 0]
     lasted_s = np.concatenate([np.diff(edges) for edges in (*falls.values(), *rises.values())])
-    period_s = _agreed(lasted_s, _PERIOD_SHARE * np.median(lasted_s)) if lasted_s.size else None
+    period_s = _consistent_median(lasted_s, _PERIOD_SHARE * np.median(lasted_s)) if lasted_s.size else None
     if period_s is None:
         return {}
     seen: dict[str, float | None] = {"period_s": period_s}
     for chamber, name in _DUTIES.items():
-        seen[name] = _agreed(_vacuum_s(falls[chamber], rises[chamber]) / period_s, _CYCLE_SHARE)
+        seen[name] = _consistent_median(_vacuum_s(falls[chamber], rises[chamber]) / period_s, _CYCLE_SHARE)
     begin_s = time_s[0] + _settled_s(trial.walked)
     for chamber, name in _PHASES.items():
-        ahead = _ahead(falls[chamber][falls[chamber] > begin_s], falls["body"], period_s)
-        turns = _agreed(ahead, _CYCLE_SHARE)
+        ahead = _phase_leads(falls[chamber][falls[chamber] > begin_s], falls["body"], period_s)
+        turns = _consistent_median(ahead, _CYCLE_SHARE)
         seen[name] = None if turns is None else 360.0 * (turns % 1.0)
     return {name: value for name, value in seen.items() if value is not None}
 
 
-def contradicted(gait: Mapping[str, float], seen: Mapping[str, float]) -> list[str]:
+def differing_parameters(gait: Mapping[str, float], seen: Mapping[str, float]) -> list[str]:
     """Return the names of parameters of `gait` that differ from those `seen`, in the gait's order."""
     return [name for name in gait if name in seen and not _same(name, gait[name], seen[name])]
 
@@ -75,7 +75,7 @@ def _why(trial: Trial, seen: Mapping[str, float], wrong: Sequence[str], walks: S
     if all(name in _DUTIES.values() and _same(name, 1.0 - given[name], seen[name]) for name in wrong):
         return "a duty is the part of the cycle at vacuum, not under pressure; correct dataset.toml"
     for other in walks:
-        if other.walked != given and not contradicted(other.walked, seen):
+        if other.walked != given and not differing_parameters(other.walked, seen):
             return f"that is the gait of {other.file}; does dataset.toml name the right file?"
     return "the robot did not walk the gait in dataset.toml; correct it there, or repeat the walk"
 
@@ -88,7 +88,7 @@ def _written(name: str, value: float) -> str:
 def _settled_s(gait: Mapping[str, float]) -> float:
     """Time until the phases have settled: three coupled oscillators synchronize at three times the coupling's rate."""
     coupling_per_s = gait.get("coupling_per_s", COUPLING_PER_S)
-    return _SETTLED / (3.0 * coupling_per_s) if coupling_per_s > 0.0 else np.inf
+    return _SETTLING_TIME_CONSTANTS / (3.0 * coupling_per_s) if coupling_per_s > 0.0 else np.inf
 
 
 def _vacuum_s(falls_s: np.ndarray, rises_s: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ def _vacuum_s(falls_s: np.ndarray, rises_s: np.ndarray) -> np.ndarray:
     return rises_s[after[whole]] - falls_s[whole]
 
 
-def _ahead(falls_s: np.ndarray, body_s: np.ndarray, period_s: float) -> np.ndarray:
+def _phase_leads(falls_s: np.ndarray, body_s: np.ndarray, period_s: float) -> np.ndarray:
     """Turns by which each fall (the beginning of a phase) is ahead of the body's next one, wrapped to lie near the
     first."""
     if not len(falls_s) or not len(body_s):
@@ -108,7 +108,7 @@ def _ahead(falls_s: np.ndarray, body_s: np.ndarray, period_s: float) -> np.ndarr
     return turns[0] + _wrapped(turns - turns[0])
 
 
-def _agreed(values: np.ndarray, tolerance: float) -> float | None:
+def _consistent_median(values: np.ndarray, tolerance: float) -> float | None:
     """Median of the values if at least two agree with it, since a start or an end may distort the others; else None."""
     if len(values) < 2:
         return None

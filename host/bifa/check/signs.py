@@ -11,11 +11,11 @@ from .swing import follow, swing
 
 _TRAVEL_MM = 5.0  # smallest travel that reaches the stable ends
 _ENDS = ((0.0, 0.05), (0.15, 0.25), (0.75, 0.85), (0.95, 1.0))  # as shares of the travel
-_FALLS = -0.05  # share of the force's range, at both ends; healthy: +0.15 or more at one end, +0.28 at the other
-_OTHER_WAY = 2.0  # ratio of the extremes on the wrong and on the right side; healthy: less than 0.1
+_MIN_RISE = -0.05  # share of the force's range, at both ends; healthy: +0.15 or more at one end, +0.28 at the other
+_MAX_REVERSED_RATIO = 2.0  # ratio of the extremes on the wrong and on the right side; healthy: less than 0.1
 # Share of its range by which a reversed quantity follows the command. Healthy: 0.92 and more for a pressure, 0.53 and
 # more for a displacement.
-AGAINST = -0.5
+MAX_REVERSED_SHARE = -0.5
 PORTS = "but should rise: are the sensor's two ports exchanged? Reverse the sign"
 _MOVES_MM = 5.0  # smallest reversed motion that counts; small actuators have a stroke of 30 mm
 
@@ -24,7 +24,7 @@ def check_static_loading(trial: Trial) -> Iterator[Finding]:
     """Check the signs of a static loading. At either stable end an actuator resists motion both ways, whatever the
     pressure: K rises there, and so does the force."""
     mm, force_N = trial.columns["displacement_mm"], trial.columns["force_N"]
-    if -mm.min() > max(_TRAVEL_MM, _OTHER_WAY * mm.max()):
+    if -mm.min() > max(_TRAVEL_MM, _MAX_REVERSED_RATIO * mm.max()):
         text = (
             f"goes down to {mm.min():.1f} mm, but should go up: displacement is positive when extending; "
             "reverse its sign"
@@ -35,7 +35,7 @@ def check_static_loading(trial: Trial) -> Iterator[Finding]:
         return
     means = [_mean(force_N[(mm >= low * mm.max()) & (mm <= high * mm.max())]) for low, high in _ENDS]
     first, last = means[1] - means[0], means[3] - means[2]
-    limit = _FALLS * np.ptp(force_N)
+    limit = _MIN_RISE * np.ptp(force_N)
     if first < limit and last < limit:
         text = (
             f"falls by {-first:.2f} N over the first fifth of the travel and by {-last:.2f} N over the last, but "
@@ -49,7 +49,7 @@ def check_anchor_pull(trial: Trial) -> Iterator[Finding]:
     """Check the sign of an anchor pull: an anchor resists, so its force is positive, whichever way the head is
     pulled."""
     force_N = trial.columns["force_N"]
-    if np.median(force_N) < 0.0 and -force_N.min() > _OTHER_WAY * force_N.max():
+    if np.median(force_N) < 0.0 and -force_N.min() > _MAX_REVERSED_RATIO * force_N.max():
         text = (
             f"the median is {np.median(force_N):.2f} N, but a resistance is positive: does the load cell "
             "count the other way? Reverse the sign"
@@ -64,7 +64,7 @@ def check_step_response(trial: Trial) -> Iterator[Finding]:
     moved_mm = swing(command, trial.columns["displacement_mm"], time_s)
     if share is None or moved_mm is None:
         return
-    falls, shrinks = share < AGAINST, moved_mm < -_MOVES_MM
+    falls, shrinks = share < MAX_REVERSED_SHARE, moved_mm < -_MOVES_MM
     if falls and shrinks:
         text = (
             f"while it is 1, the pressure falls and the displacement shrinks by {-moved_mm:.1f} mm: 1 is positive "

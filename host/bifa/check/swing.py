@@ -31,5 +31,5 @@ def swing(command: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> float 
 
 def follow(command: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> float | None:
     """Return `swing` as a share of the values' range, -1 to 1; None if the command or the values never change."""
-    span, gone = float(np.ptp(values)), swing(command, values, time_s)
-    return None if gone is None or span == 0.0 else gone / span
+    span, travel = float(np.ptp(values)), swing(command, values, time_s)
+    return None if travel is None or span == 0.0 else travel / span

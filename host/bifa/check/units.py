@@ -22,7 +22,8 @@ _PRESSED_PSI = 3.0  # from here on area times pressure outweighs the spring in t
 _HELD_PSI = 5.0  # from here on an anchor holds
 _SNAP_S = 0.06
 _SNAP = 0.35  # share of the range covered within _SNAP_S; healthy: 0.5 and more in a snap-through, 0.15 without one
-_SMALLER, _LARGER = 0.2, 2.2  # relative to the cross-head's stroke; healthy: 1.1 to 1.5, as vacuum and pressure add
+# Relative to the cross-head's stroke. Healthy: 1.1 to 1.5, as vacuum and pressure add.
+_MIN_STROKE_RATIO, _MAX_STROKE_RATIO = 0.2, 2.2
 _PULL_N = (2.0, 150.0)  # median force of an anchor that holds; healthy: 15 to 31, and 4 if it does not hold
 _LONGEST_MM = 200.0  # range of the body's length; healthy: 60 to 70
 
@@ -52,7 +53,7 @@ def check_units(trial: Trial) -> Iterator[Finding]:
         long_mm = float(np.ptp(length_mm(trial)))
         if long_mm > _LONGEST_MM:
             text = f"the body's length changes by {long_mm:.4g} mm, but only about 60 is possible"
-            yield Finding("unit", text + _or_else(long_mm, 60.0, _MM), trial.file, column="displacement_head_mm")
+            yield Finding("unit", text + _suggest_unit(long_mm, 60.0, _MM), trial.file, column="displacement_head_mm")
 
 
 def check_strokes(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
@@ -64,21 +65,21 @@ def check_strokes(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[F
         if found:
             strokes[actuator] = float(np.median(found))
     for trial in dataset.trials:
-        shown, column = _seen(trial)
+        shown, column = _observed_actuator(trial)
         if shown is None or shown not in strokes or trial.file in skipped:
             continue
         seen_mm = length_mm(trial)
         moved_mm = float(np.ptp(seen_mm))
         share = moved_mm / strokes[shown]
-        if share > _LARGER or (share < _SMALLER and _snaps(trial.time_s, seen_mm)):
+        if share > _MAX_STROKE_RATIO or (share < _MIN_STROKE_RATIO and _snaps(trial.time_s, seen_mm)):
             text = (
                 f"moves by {moved_mm:.3g} mm, but by {strokes[shown]:.3g} mm in the testing machine"
-                f"{_or_else(moved_mm, 1.2 * strokes[shown], _MM)}"
+                f"{_suggest_unit(moved_mm, 1.2 * strokes[shown], _MM)}"
             )
             yield Finding("unit", text, trial.file, column=column)
 
 
-def _seen(trial: Trial) -> tuple[str | None, str]:
+def _observed_actuator(trial: Trial) -> tuple[str | None, str]:
     """The actuator whose length a camera saw, and the column. Without a tracked tail a walk shows no length."""
     if trial.experiment == "step_response":
         return trial.actuator, "displacement_mm"
@@ -105,12 +106,14 @@ def _speed(trial: Trial) -> Iterator[Finding]:
     if speed_mm_s is not None and not _SPEED[0] < speed_mm_s / trial.commanded_mm_s < _SPEED[1]:
         text = (
             f"moves at {speed_mm_s:.3g} mm/s, but rate_mm_s = {trial.rate_mm_s:g}"
-            f"{_or_else(speed_mm_s, trial.commanded_mm_s, _MM, 0.1)}"
+            f"{_suggest_unit(speed_mm_s, trial.commanded_mm_s, _MM, 0.1)}"
         )
         yield Finding("unit", text, trial.file, column="displacement_mm")
     elif moved_mm > high or 0.0 < moved_mm < 0.3 * low:  # part of the stroke may have been intended
         text = f"moves by {moved_mm:.3g} mm, but the actuator's stroke is {low:g} to {high:g} mm"
-        yield Finding("unit", text + _or_else(moved_mm, 0.5 * (low + high), _MM), trial.file, column="displacement_mm")
+        yield Finding(
+            "unit", text + _suggest_unit(moved_mm, 0.5 * (low + high), _MM), trial.file, column="displacement_mm"
+        )
 
 
 def _speed_mm_s(trial: Trial) -> float | None:
@@ -129,7 +132,7 @@ def _force(trial: Trial) -> Iterator[Finding]:
     for seen, (low, high), what in _forces(trial, force_N):
         if not low <= seen <= high:
             text = f"{what} {seen:.3g}, but only {low:.3g} to {high:.3g} is possible"
-            yield Finding("unit", text + _or_else(seen, np.sqrt(low * high), _N), trial.file, column="force_N")
+            yield Finding("unit", text + _suggest_unit(seen, np.sqrt(low * high), _N), trial.file, column="force_N")
             return
 
 
@@ -149,7 +152,7 @@ def _forces(trial: Trial, force_N: np.ndarray) -> Iterator[tuple[float, tuple[fl
         yield area, (low / _AREA, high * _AREA), "mean force over pressure in N/psi:"
 
 
-def _or_else(seen: float, expected: float, units: Mapping[str, float], within: float = 0.5) -> str:
+def _suggest_unit(seen: float, expected: float, units: Mapping[str, float], within: float = 0.5) -> str:
     """The rest of a message: the unit that would make the value plausible, if there is one, and what to do."""
     for unit, size in units.items():
         if abs(np.log(seen * size / expected)) < within if seen > 0.0 else False:

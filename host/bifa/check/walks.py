@@ -13,15 +13,15 @@ from bifa.data import Trial
 from bifa.robot.cpg import CHAMBERS
 
 from .mirror import check_mirror, shortens_mm
-from .schedule import check_gait, contradicted, seen_gait
-from .signs import AGAINST, PORTS
+from .schedule import check_gait, differing_parameters, estimate_gait
+from .signs import MAX_REVERSED_SHARE, PORTS
 from .swing import follow, swing
 
 # Share of a pressure's range. In cycles of 3 s and more it follows its own command over 0.62 to 0.98 of it, even if
 # valves choke; in faster ones over less, which proves nothing.
-_FOLLOWS = 0.5
+_MIN_FOLLOW_SHARE = 0.5
 # Gain over following its own command. In healthy walks every exchange makes one of the chambers worse by 0.24 or more.
-_BETTER = 0.04
+_MIN_GAIN = 0.04
 
 Exchange = dict[str, str]  # chamber -> chamber whose command its pressure follows
 
@@ -29,17 +29,17 @@ Exchange = dict[str, str]  # chamber -> chamber whose command its pressure follo
 def check_walk(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
     """Yield the mistakes in a walk. `walks`: the day's other walks, whose gait this may be."""
     shares = _following(trial)
-    all_against = bool((np.diag(shares) < AGAINST).all())
+    all_against = bool((np.diag(shares) < MAX_REVERSED_SHARE).all())
     if all_against and shortens_mm(trial):
         text = (
             "while they are 1, the pressures fall and the body gets shorter: 1 is positive pressure, 0 vacuum; "
             "exchange them in all three columns"
         )
         yield Finding("sign", text, trial.file, column="command_body")
-    elif not all_against and (exchange := _exchanged(shares)):
+    elif not all_against and (exchange := _find_exchange(shares)):
         yield _exchange_finding(trial, exchange, shares)
     else:
-        yield from _turned(trial, shares)
+        yield from _check_reversed(trial, shares)
         yield from check_mirror(trial)
         yield from check_gait(trial, walks)
 
@@ -55,13 +55,15 @@ def _following(trial: Trial) -> np.ndarray:
     return shares
 
 
-def _exchanged(shares: np.ndarray) -> Exchange:
+def _find_exchange(shares: np.ndarray) -> Exchange:
     """The chambers whose pressures follow one another's commands far better than their own; empty if none."""
     best, most = {}, 0.0
     for order in permutations(range(3)):
         moved = [i for i in range(3) if order[i] != i]
         gains = [shares[i, order[i]] - shares[i, i] for i in moved]
-        follows = all(shares[i, order[i]] > _FOLLOWS and gain > _BETTER for i, gain in zip(moved, gains, strict=True))
+        follows = all(
+            shares[i, order[i]] > _MIN_FOLLOW_SHARE and gain > _MIN_GAIN for i, gain in zip(moved, gains, strict=True)
+        )
         if moved and follows and min(gains) > most:
             best, most = {CHAMBERS[i]: CHAMBERS[order[i]] for i in moved}, min(gains)
     return best
@@ -78,16 +80,16 @@ def _exchange_finding(trial: Trial, exchange: Exchange, shares: np.ndarray) -> F
     )
     names = " and ".join(exchange)
     renamed = {f"command_{c}": trial.columns[f"command_{exchange.get(c, c)}"] for c in CHAMBERS}
-    if _fits(trial, trial.columns) or not _fits(trial, renamed):
+    if _matches_gait(trial, trial.columns) or not _matches_gait(trial, renamed):
         what = f"pressure columns, sensors or tubes of {names} are exchanged: trace the tubes, or rename the columns"
     else:
         what = f"the command columns of {names} are exchanged, as the gait confirms: rename them"
     return Finding("swapped", f"{seen}: {what}", trial.file, column=f"pressure_{chamber}_psi")
 
 
-def _turned(trial: Trial, shares: np.ndarray) -> Iterator[Finding]:
+def _check_reversed(trial: Trial, shares: np.ndarray) -> Iterator[Finding]:
     """A finding for pressures that fall while their own command is positive."""
-    chambers = [CHAMBERS[i] for i in np.flatnonzero(np.diag(shares) < AGAINST)]
+    chambers = [CHAMBERS[i] for i in np.flatnonzero(np.diag(shares) < MAX_REVERSED_SHARE)]
     if chambers:
         names = [f"pressure_{chamber}_psi" for chamber in chambers]
         falls = [
@@ -103,5 +105,5 @@ def _percent(row: np.ndarray, chamber: str) -> str:
     return f"{100 * row[CHAMBERS.index(chamber)]:.0f}"
 
 
-def _fits(trial: Trial, commands: dict[str, np.ndarray]) -> bool:
-    return not contradicted(trial.walked, seen_gait(trial, commands))
+def _matches_gait(trial: Trial, commands: dict[str, np.ndarray]) -> bool:
+    return not differing_parameters(trial.walked, estimate_gait(trial, commands))

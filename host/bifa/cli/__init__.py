@@ -72,7 +72,7 @@ for _command in app.registered_commands:  # paragraphs fill the terminal, wherev
 
 def main() -> None:
     """Run the command; an expected error prints its message and exits with status 2."""
-    _print_anything()
+    _replace_unencodable()
     try:
         app()
     except Exception as error:
@@ -83,7 +83,7 @@ def main() -> None:
         sys.exit(2)
 
 
-def _print_anything() -> None:
+def _replace_unencodable() -> None:
     """Replace what cannot be encoded: on Windows, redirected output uses a legacy code page without Greek letters."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # without a console it is None; an embedding program may replace it

@@ -89,7 +89,7 @@ def campaign(
     from dataclasses import replace
 
     from bifa.campaign.setup import Effort, Setup
-    from bifa.measure.bench_file import known_on, parse_known
+    from bifa.measure.bench_file import load_or_ask_known, parse_known
     from bifa.screen import Console
 
     console = Console()
@@ -98,7 +98,7 @@ def campaign(
     with stoppable(lambda: f"{kept_on_disk(out)}. Run the same command to resume"):
         if setup.is_by_hand:
             desk, hands = at_desk(console, watch, bench)
-            setup = replace(setup, known={**known_on(bench, desk), **setup.known}, hands=hands)
+            setup = replace(setup, known={**load_or_ask_known(bench, desk), **setup.known}, hands=hands)
 
         with console.status("starting"):  # slow imports, so the questions come first
             from bifa.campaign import loop

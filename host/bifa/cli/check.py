@@ -64,10 +64,10 @@ def warn_of_units(console: "Console", dataset: "Dataset") -> None:
 
 
 def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
-    from bifa.check.finding import gathered
+    from bifa.check.finding import merge_findings
     from bifa.screen import warning
 
-    for found in gathered(findings):
+    for found in merge_findings(findings):
         console.print(warning(f"[{found.kind}] {found.text}"))
         if found.places:
             console.print(f"  {'; '.join(found.places)}")

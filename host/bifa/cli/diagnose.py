@@ -115,21 +115,25 @@ def diagnose(
     with Progress(SpinnerColumn(), words("{task.description}"), TimeElapsedColumn(), console=console) as progress:
         task = progress.add_task("fitting stiffness curves")
 
-        def said(what: str, share: float = 0.0) -> None:
+        def report_progress(what: str, share: float = 0.0) -> None:
             progress.update(task, description=spoken(what))
 
-        def diagnosed(trials: Dataset, confusable: Collection[str] = ()) -> Diagnosis:
+        def run_diagnosis(trials: Dataset, confusable: Collection[str] = ()) -> Diagnosis:
             system = prepare(trials, robot)
             system.accuracies = good_enough
             suspected = {*(suspect or ()), *confusable}
-            return engine.diagnose(system, seed=seed, suspected=suspected, on_progress=said, executor=executor)
+            return engine.diagnose(
+                system, seed=seed, suspected=suspected, on_progress=report_progress, executor=executor
+            )
 
         with workers as (executor, _):
-            found = diagnosed(measured)
+            found = run_diagnosis(measured)
             if resolve:
                 rigs = _rigs(measured, port, progress)
                 try:
-                    measured, found, _ = further.resolve(measured, found, diagnosed, rigs, resolved, said, hands)
+                    measured, found, _ = further.resolve(
+                        measured, found, run_diagnosis, rigs, resolved, report_progress, hands
+                    )
                 except BaseException:  # whatever happened to the rig, report what the data say
                     progress.stop()
                     _report(console, measured, found, json, out, report)

@@ -51,7 +51,7 @@ _USED_BY = {  # options that only some experiments use
 }
 
 
-def _named(text: str) -> str:
+def _check_name(text: str) -> str:
     if text not in NAMES:
         raise typer.BadParameter(f"{text!r} is not one of {', '.join(NAMES)}")
     return text
@@ -59,7 +59,7 @@ def _named(text: str) -> str:
 
 WHICH = typer.Argument(
     help=f"{', '.join(NAMES[:-1])}, or all (the paper's section IV, and walks).",
-    callback=_named,  # a Literal would be listed as one word, which narrow terminals cannot wrap
+    callback=_check_name,  # a Literal would be listed as one word, which narrow terminals cannot wrap
     autocompletion=lambda: list(NAMES),
     metavar="EXPERIMENT",
 )
@@ -150,7 +150,9 @@ def experiment(
         quick=quick,
     )
     if instrument is not None:
-        _import(console, instrument, telemetry, _only(trials), out, parse_known(known), add, bench or BENCH_FILE)
+        _import(
+            console, instrument, telemetry, _single_condition(trials), out, parse_known(known), add, bench or BENCH_FILE
+        )
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
     with stoppable(lambda: f"valves off; {kept(out, 'finished trial')}; run the same command to resume"):
@@ -240,7 +242,7 @@ def _run(
     console.print(f"Next: bifa check {quoted}, then bifa fit {quoted} --out model.toml", soft_wrap=True)
 
 
-def _only(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":
+def _single_condition(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":
     """Return the only condition that the options select; the condition of an imported record cannot be guessed."""
     first = [trial for trial in trials if trial.repeat == 1]
     if len(first) > 1:

@@ -19,7 +19,7 @@ EXAMPLES = (
     "bifa instrument --presets",
 )
 _ROLES = ["machine", "camera"]
-_MOST_PLOTS = 8
+_MAX_PLOTS = 8
 
 
 def instrument(
@@ -63,10 +63,10 @@ def instrument(
         raise BifaError(
             f"{bench} already declares [instrument.{role}]: remove that table first, or name another --bench"
         )
-    table = _asked(console, seen, role)
+    table = _ask_declaration(console, seen, role)
     text = declaration(role, table)
     console.print(f"\n{text}")  # before it is checked, so that the answers are not lost if that fails
-    _prove(console, file, role, table)
+    _verify(console, file, role, table)
     if typer.confirm(f"Write this into {bench}?", default=False):
         before = bench.read_text(encoding="utf-8") if bench.exists() else ""
         write_text(bench, f"{before.rstrip()}\n\n{text}" if before.strip() else text)
@@ -93,7 +93,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
     labels, units = seen.sheet.labels(), seen.sheet.units
     rows = [[label, unit, *row] for label, unit, row in zip(labels, units, zip(*seen.rows(), strict=True), strict=True)]
     print_table(console, PageTable(["column", "units row", *["row"] * len(seen.rows())], rows, ""))
-    for place, label in list(enumerate(labels))[:_MOST_PLOTS]:
+    for place, label in list(enumerate(labels))[:_MAX_PLOTS]:
         try:
             values = seen.sheet.numbers(place, label)
         except DatasetError as error:
@@ -105,7 +105,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
                 console.print(line)
 
 
-def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
+def _ask_declaration(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
     """Ask for the declaration, question by question; Enter accepts the proposal in brackets."""
     from bifa.data.export import units_for
     from bifa.measure.propose import parsed, wanted
@@ -200,7 +200,7 @@ def _sync(console: "Console", seen: "Look") -> dict[str, Any]:
             }
 
 
-def _prove(console: "Console", file: Path, role: str, table: dict[str, Any]) -> None:
+def _verify(console: "Console", file: Path, role: str, table: dict[str, Any]) -> None:
     """Read the file as declared, and print what it contains; raises DatasetError if that fails."""
     import numpy as np
 

@@ -79,7 +79,7 @@ def optimize(
     from bifa.screen import Console, warning
 
     console = Console()
-    with ExitStack() as open_until_the_end:
+    with ExitStack() as stack:
         with console.status("starting"):
             from bifa.gait import Settings, optimize, paper_space, simulations
             from bifa.gait.library.scenarios import provenance
@@ -93,7 +93,7 @@ def optimize(
                 for run in range(runs or (3 if method == "bo" else 1))
             ]
             tls = cluster.Tls(dask_ca, dask_cert, dask_key)
-            pool = open_until_the_end.enter_context(simulations(dask, tls=tls))
+            pool = stack.enter_context(simulations(dask, tls=tls))
         optima = []
         for one in settings:
             with search_progress(console) as progress:

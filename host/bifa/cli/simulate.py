@@ -125,12 +125,12 @@ def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Adv
         table.add_row(str(k + 1), f"{1e3 * advance:.2f}", f"{1e3 * slip:.3f}", f"{1e3 * advance / gait.period_s:.2f}")
     console.print(table)
     console.print(f"speed of the last cycle: {progress.speed_mm_s[0]:.2f} mm/s")
-    from bifa.gait.settling import LEAST, settling
+    from bifa.gait.settling import MIN_CYCLES, settling
 
     found = settling(1e3 * progress.advance_m[0])
     if found.is_settled:
         console.print(f"settled from cycle {found.begins + 1} on")
-    elif found.cycles < LEAST:
+    elif found.cycles < MIN_CYCLES:
         console.print("too few cycles to tell whether it settles; try more --cycles")
     else:
         console.print(f"not settled: the last {found.cycles} cycles vary by {found.varies:.1%}; try more --cycles")

@@ -40,8 +40,17 @@ _LENGTHS = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "in": 25.4, "um": 1e-3}
 _FORCES = {"N": 1.0, "kN": 1000.0, "mN": 1e-3, "lbf": 4.4482216152605, "kgf": 9.80665, "gf": 9.80665e-3}
 _PRESSURES = {"psi": 1.0, "kPa": 0.1450377377, "bar": 14.50377377, "mbar": 0.01450377377, "MPa": 145.0377377}
 UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": _SECONDS}  # by the suffix of a column's name
-_SPELT = {"sec": "s", "seconds": "s", "second": "s", "msec": "ms", "µm": "um", "inch": "in", "lb": "lbf", "volts": "v"}
-_SPELT |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
+_UNIT_ALIASES = {
+    "sec": "s",
+    "seconds": "s",
+    "second": "s",
+    "msec": "ms",
+    "µm": "um",
+    "inch": "in",
+    "lb": "lbf",
+    "volts": "v",
+}
+_UNIT_ALIASES |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
 _ROWS = {"skip_rows": 0, "header_rows": 1, "units_rows": 0}  # and the minimum of each
 _CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ",")}
 _TABLES = ("columns", "units", "factor", "sign", "offset")  # keyed by the data set's columns
@@ -218,7 +227,7 @@ def unit_in(text: str) -> str | None:
     """Return the unit that a text ends with in brackets, or consists of; None if there is none."""
     found = _BRACKETS.search(text)
     word = (found[1] if found else text).strip()
-    word = _SPELT.get(word.lower(), word)
+    word = _UNIT_ALIASES.get(word.lower(), word)
     known = {unit for sizes in UNITS.values() for unit in sizes}
     return word if word in known else None
 

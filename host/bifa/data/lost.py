@@ -4,10 +4,11 @@ values."""
 import numpy as np
 
 _CODES = (999.0, 9999.0, 99999.0, 999999.0)  # of either sign, as exporters write for missing values
-_HELD = 3  # equal samples in a row; two may be chance
-_RARELY = 0.05  # largest share of equal neighbours elsewhere: a coarse instrument, or a marker at rest, repeats values
+_MIN_HELD_SAMPLES = 3  # equal samples in a row; two may be chance
+# Largest share of equal neighbours elsewhere: a coarse instrument, or a marker at rest, repeats values.
+_MAX_REPEAT_SHARE = 0.05
 _JUMP_MM = 1.0  # smallest jump before or after a run of equal samples that shows the marker moved meanwhile
-_FAR_MM = 5.0  # a jump this large at both ends of a run is not a motion
+_CERTAIN_JUMP_MM = 5.0  # a jump this large at both ends of a run is not a motion
 
 
 def codes(values: np.ndarray) -> np.ndarray:
@@ -23,12 +24,12 @@ def held(values_mm: np.ndarray) -> np.ndarray:
     found = np.zeros(len(values_mm), bool)
     same = np.diff(values_mm) == 0.0
     for first, last in runs(same):  # `same` is about steps: samples first to last, both included, are equal
-        if last - first + 1 < _HELD:
+        if last - first + 1 < _MIN_HELD_SAMPLES:
             continue
         entry = abs(values_mm[first] - values_mm[first - 1]) if first else 0.0
         leave = abs(values_mm[last + 1] - values_mm[last]) if last + 1 < len(values_mm) else 0.0
-        elsewhere = same.sum() - (last - first) <= _RARELY * len(same)
-        if min(entry, leave) > _FAR_MM:  # set to an unrelated number: not even the first sample was measured
+        elsewhere = same.sum() - (last - first) <= _MAX_REPEAT_SHARE * len(same)
+        if min(entry, leave) > _CERTAIN_JUMP_MM:  # set to an unrelated number: not even the first sample was measured
             found[first : last + 1] = True
         elif elsewhere and max(entry, leave) > _JUMP_MM:
             found[first + 1 : last + 1] = True

@@ -85,8 +85,8 @@ def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> di
 
 
 def _check_header(sheet: Sheet, layout: Layout) -> None:
-    """Raise DatasetError unless the header of a file in the data set's own form has all columns of the experiment, each
-    once, and no others."""
+    """Raise DatasetError unless the header of a file in the data set's own form has each required column once, each
+    optional one at most once, and no others."""
     names, expected = sheet.labels(), f"the columns of this experiment are {', '.join(layout.all_columns)}"
     for place, name in enumerate(names):
         if name.startswith("#"):
@@ -109,8 +109,8 @@ def _check_values(columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndar
         if wrong.any():
             row = int(np.argmax(wrong))
             value, before = (float(columns[name][at]) for at in (row, row - 1))
-            said = problem.format(value=value, before=before, step=value - before)
-            raise sheet.error(said, int(rows[row]), named.get(name, name))
+            message = problem.format(value=value, before=before, step=value - before)
+            raise sheet.error(message, int(rows[row]), named.get(name, name))
 
     if len(rows) < 2:
         raise sheet.error(f"{len(rows)} rows of data; at least two are needed", len(sheet) - 1)
@@ -130,7 +130,7 @@ def _read_toml(folder: Path) -> tuple[Fields, Source]:
     try:
         raw = read_bytes(folder / TABLE_FILE)
     except FileNotFoundError:
-        raise DatasetError(_no_table(folder)) from None
+        raise DatasetError(_explain_missing_table(folder)) from None
     except OSError as error:
         raise DatasetError(f"cannot be read ({error.strerror})", file=TABLE_FILE) from None
     try:
@@ -147,7 +147,7 @@ def _read_toml(folder: Path) -> tuple[Fields, Source]:
     return Fields(values, source), source
 
 
-def _no_table(folder: Path) -> str:
+def _explain_missing_table(folder: Path) -> str:
     inside = sorted(path.parent.name for path in folder.glob(f"*/{TABLE_FILE}"))
     if inside:
         return f"{folder} is not a data set, but contains {', '.join(inside)}: use {folder / inside[0]}"

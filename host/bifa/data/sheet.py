@@ -25,7 +25,7 @@ from .errors import DatasetError
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NAMES_OF = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
 _HEAD = 1 << 18  # bytes in which a header has to be found
-_MOST_NAMED = 8
+_MAX_LISTED = 8
 
 
 @dataclass(frozen=True)
@@ -298,8 +298,8 @@ def workbook(path: Path, sheet: str | None, file: str) -> tuple[Any, list[list[s
 def listed(names: Iterable[str]) -> str:
     """Return the first names, and how many more there are."""
     names = list(names)
-    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    return ", ".join(names[:_MOST_NAMED]) + more
+    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
+    return ", ".join(names[:_MAX_LISTED]) + more
 
 
 def _parts(rows: Sequence[Sequence[str]], place: int) -> tuple[str, ...]:

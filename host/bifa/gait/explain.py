@@ -17,9 +17,9 @@ class Anatomy:
     """One settled cycle of a gait on a model. Times in s, pressures in psi.
 
     extension_s, contraction_s: from the body's command until it passes its unstable point; NaN if it never does.
-    tail_lead_s: from the tail's command to anchor to the body's command to extend; head_lead_s: from the head's to the
-    body's command to contract (negative: after it). extended_psi, contracted_psi: body pressure when the next command
-    is given.
+    tail_lead_s: from the tail's command to anchor to the body's to extend; head_lead_s: from the head's to anchor to
+    the body's to contract (both negative if after it). extended_psi, contracted_psi: body pressure when the next
+    command is given.
     """
 
     gait: Gait

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifa.gait.settling import MOST_CYCLES
+from bifa.gait.settling import MAX_CYCLES
 from bifa.simulate import Advance
 from bifa.simulate.rigs import CLEAR
 from bifa.simulate.terrain import passed_at_m, terrain, tunnel
@@ -17,7 +17,7 @@ from bifa.simulate.terrain import passed_at_m, terrain, tunnel
 _LONGEST_BODY_M = 0.06
 # Share of the advance by which cycles may differ on a rippling supply or with a growing tether: such walks are never
 # periodic to a thousandth, but a gait that fails differs by more.
-_UNLIKE = 0.2
+_MAX_VARIATION = 0.2
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Metric:
     def in_full(self) -> "Metric":
         """Return the metric with all the cycles of a measured walk, the second half judged, if walks never settle: with
         a tether a gait may fail as late as after sixteen cycles."""
-        return replace(self, cycles=MOST_CYCLES, judged=MOST_CYCLES // 2) if self.unlike else self
+        return replace(self, cycles=MAX_CYCLES, judged=MAX_CYCLES // 2) if self.unlike else self
 
     def quicker(self) -> "Metric":
         """Return the metric for searches over many draws: six cycles, longer steps; the gaits it accepts are judged
@@ -84,11 +84,11 @@ class Metric:
     def of_draws(self) -> "Metric":
         """Return the metric for drawn robots and, in a robust search, the model itself: they may slip, and their cycles
         may differ, because a measured speed counts however it is achieved."""
-        return replace(self, periodic=_UNLIKE, slip_m=np.inf)
+        return replace(self, periodic=_MAX_VARIATION, slip_m=np.inf)
 
     def of_unlike_cycles(self) -> "Metric":
         """Return the metric for a robot that never walks the same cycle twice."""
-        return replace(self, periodic=_UNLIKE, unlike=True)
+        return replace(self, periodic=_MAX_VARIATION, unlike=True)
 
     def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""

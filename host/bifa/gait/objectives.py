@@ -68,14 +68,14 @@ class RobustSpeed:
         bound = self._own(points)
         alive = np.flatnonzero(bound >= max(self._abandon * self._best, 1e-9))
         done, size = 0, _FIRST_DRAWS + self._rank
-        told = size if self._failures.any() else draws  # draws before a batch may settle a gait
+        min_draws = size if self._failures.any() else draws  # draws before a batch may settle a gait
         while alive.size and done < draws:
             batch = order[done : done + size]
             gaits, which = np.repeat(alive, len(batch)), np.tile(batch, alive.size)
             met[gaits, which] = self._speeds(rows[gaits], which)
             done, size = done + len(batch), 2 * size
             slowest = np.partition(met[alive], self._rank - 1)[:, self._rank - 1]
-            settled = (slowest >= bound[alive]) & (done > told) | (done >= draws)
+            settled = (slowest >= bound[alive]) & (done > min_draws) | (done >= draws)
             bound[alive] = np.minimum(bound[alive], slowest)
             low = met[np.ix_(alive, batch)] < self._abandon * np.maximum(bound[alive], self._best)[:, None]
             self._failures[batch] += low.mean(axis=0)

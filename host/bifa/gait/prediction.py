@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bifa.effects import library
-from bifa.gait.settling import CAMERA_MM, LEAST, STANDING_MM_S, settling
+from bifa.gait.settling import CAMERA_MM, MIN_CYCLES, STANDING_MM_S, settling
 from bifa.gait.uncertainty import Knowledge
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
@@ -18,7 +18,7 @@ from bifa.simulate import gait_rows, speeds
 DRAWS = 256
 FINE_M = 1e-6  # integration step for gaits near the edge
 CYCLES = 16
-FELL = 0.8  # of the median of the robots that walk: slower ones do not walk as predicted
+MIN_SPEED_RATIO = 0.8  # of the median of the robots that walk: slower ones do not walk as predicted
 _FASTEST = 0.98  # quantile from which walking robots are identified: at a cliff most robots may fall
 
 
@@ -36,9 +36,9 @@ class Prediction:
     @cached_property
     def walks(self) -> np.ndarray:
         """(n,) which robots walk: those that reach four fifths of the median of all that walk."""
-        walking = self.speeds_mm_s >= FELL * np.quantile(self.speeds_mm_s, _FASTEST)
+        walking = self.speeds_mm_s >= MIN_SPEED_RATIO * np.quantile(self.speeds_mm_s, _FASTEST)
         while walking.any():
-            least = max(FELL * float(np.median(self.speeds_mm_s[walking])), STANDING_MM_S)
+            least = max(MIN_SPEED_RATIO * float(np.median(self.speeds_mm_s[walking])), STANDING_MM_S)
             before, walking = walking, self.speeds_mm_s >= least
             if np.array_equal(before, walking):
                 break
@@ -110,7 +110,7 @@ class Predictor:
         clock_rate: seconds per second of the Uno, default as known; speeds are on the Uno's clock.
         """
         draws, rate = len(self._robots), self._timing.clock if clock_rate is None else clock_rate
-        rows = self._switched(gait_rows([gait] * draws))
+        rows = self._with_switch_errors(gait_rows([gait] * draws))
         rows[:, 0] *= rate
         vented_s = rate * self._timing.dead_time_s
         progress = speeds(self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, workers=workers)
@@ -118,14 +118,14 @@ class Predictor:
         found = [settling(one) for one in advance_mm]
         means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
         noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
-        camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (LEAST * gait.period_s)  # of a speed measured over `LEAST` cycles
+        camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (MIN_CYCLES * gait.period_s)  # of a speed over `MIN_CYCLES` cycles
         means = means * (1.0 + self._noise_share * noise[0]) + noise[1] * camera_mm_s
         means = np.nan_to_num(means)
         backward = bool(np.mean(means) < -STANDING_MM_S)
         along = np.fmax(-means if backward else means, 0.0)
-        return Prediction(along, _most(f.begins for f in found if f.is_settled) + LEAST, backward)
+        return Prediction(along, _settling_cycles(f.begins for f in found if f.is_settled) + MIN_CYCLES, backward)
 
-    def _switched(self, rows: np.ndarray) -> np.ndarray:
+    def _with_switch_errors(self, rows: np.ndarray) -> np.ndarray:
         """The gaits (n, 6) with valves that switch slightly early or late in each walk: at a cliff half a millisecond
         decides."""
         most_s = self._timing.switch_error_s
@@ -155,7 +155,7 @@ def settles(model: Model) -> bool:
     return not any(library()[effect].unlike_cycles for effect in model.effects)
 
 
-def _most(begins: Iterable[int]) -> int:
+def _settling_cycles(begins: Iterable[int]) -> int:
     """Cycles within which nineteen of twenty robots settle."""
     every = list(begins)
     return int(np.ceil(np.quantile(every, 0.95))) if every else CYCLES

@@ -8,12 +8,12 @@ import numpy as np
 from bifa.errors import BifaError
 from bifa.gait.families import FAMILIES, PERIODS
 from bifa.gait.methods import METHODS, Evaluated
-from bifa.gait.methods.cma_es import APART, POPULATION, basins, climb_basins, climb_together
+from bifa.gait.methods.cma_es import BASIN_SPACING, POPULATION, basins, climb_basins, climb_together
 from bifa.gait.methods.common import Objective, OnEvaluated, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
 from bifa.gait.pool import Simulations
-from bifa.gait.prediction import CYCLES, FELL, FINE_M, Prediction, predict_speed, settles
+from bifa.gait.prediction import CYCLES, FINE_M, MIN_SPEED_RATIO, Prediction, predict_speed, settles
 from bifa.gait.settling import STANDING_MM_S
 from bifa.gait.space import TIMES, SearchSpace, paper_space
 from bifa.gait.uncertainty import Knowledge, spread_of
@@ -72,13 +72,13 @@ _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004), in_full=T
 _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
 _BASINS, _STARTS = 24, 8  # explored gaits where climbs on robots start; those to refine if there were no climbs
-_NEAR, _FAR = 0.003, 0.02  # minimum distance between finalists, on some axis of the unit cube
+_MIN_SPACING, _WIDE_SPACING = 0.003, 0.02  # minimum distance between finalists, on some axis of the unit cube
 # Climbs on robots: how many families to start from, and the shares of the best value that these, and the end points of
 # the previous round, must reach.
-_FAMILIES, _FAMILY_WORTH, _END_WORTH = 3, 0.9, 0.95
+_FAMILIES, _MIN_FAMILY_RATIO, _MIN_END_RATIO = 3, 0.9, 0.95
 # Shares of the best value that a gait must keep in the check: to be accepted at once, and to count as walking.
-_KEPT, _PROMISED = 0.993, 0.5
-_NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
+_ACCEPT_RATIO, _WALK_RATIO = 0.993, 0.5
+_NO_FINALIST = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
 _FINAL_STEP, _FINAL = 0.015, 600  # initial step and budget of the refinement on the model itself
 
 
@@ -163,7 +163,7 @@ class SearchRun:
     settings: Settings
     on_progress: OnProgress = lambda stage, share, best: None
 
-    def telling(self, stage: str, budget: int, least: float = -np.inf) -> OnEvaluated:
+    def progress_callback(self, stage: str, budget: int, least: float = -np.inf) -> OnEvaluated:
         """Return a progress callback for a stage of `budget` evaluations; `least`: best value before the stage."""
         return lambda count, best: self.on_progress(stage, min(count / budget, 1.0), max(best, least))
 
@@ -186,7 +186,7 @@ class SearchRun:
             return drawn
         rows, metric = gait_rows(self.settings.begin), self.settings.metric.quicker()
         speeds = distribution(self.runs, drawn, rows, metric)
-        least = FELL * np.median(speeds, axis=1, keepdims=True)
+        least = MIN_SPEED_RATIO * np.median(speeds, axis=1, keepdims=True)
         if (speeds >= least).all():
             return drawn
         more = self.known.plants(self.model, 2 * count, seed)[count:]
@@ -198,7 +198,7 @@ class SearchRun:
         """Draw the robots that `Optimum.speeds_mm_s` refers to."""
         return self.robots(VERIFYING_DRAWS, self.settings.seed + 2_000_003)
 
-    def finely(self, rows: np.ndarray) -> np.ndarray:
+    def fine_speeds(self, rows: np.ndarray) -> np.ndarray:
         """Speeds (n,) of gaits (n, 6) on the model itself by the finer metric."""
         return on_model(self.runs, plant(self.model), rows, self.settings.rules.finer())
 
@@ -235,7 +235,7 @@ def optimize(
         gait, nominal = best_of_finalists(search, explored, [explored, *refined][-1])
     else:
         refined = [_refine(search, own, explored)] if settings.refine else []
-        gait, nominal = _nominally(search, explored.joined(*refined))
+        gait, nominal = _fastest_finalist(search, explored.joined(*refined))
     verifying, finest = search.verifying_robots(), replace(metric.in_full(), tolerance_m=FINE_M)
     speeds = distribution(runs, verifying, gait_rows([gait]), finest)[0]
     search.on_progress("verify", 1.0, nominal)
@@ -266,7 +266,7 @@ def _explore(search: SearchRun, objective: Objective) -> Evaluated:
     settings, space = search.settings, search.settings.space
     budget = _budget(settings)
     method = METHODS[settings.method]
-    explored = method(objective, space.wraps, budget, settings.seed, search.telling("search", budget))
+    explored = method(objective, space.wraps, budget, settings.seed, search.progress_callback("search", budget))
     begun = space.nearest(settings.begin)
     return explored.joined(Evaluated(begun, objective(begun))) if len(begun) else explored
 
@@ -275,18 +275,20 @@ def explore_on_robots(search: SearchRun, explored: Evaluated) -> Evaluated:
     """Run CMA-ES on a few robots, from gait families, the basins of the nominal speed, and `settings.begin`. Slower
     copies are tried too: the nominally fastest gaits are beyond the cliff of most robots, where the objective is 0."""
     settings, space, wraps = search.settings, search.settings.space, search.settings.space.wraps
-    budget = _scaled(EXPLORE.evaluations, settings)
-    recorder = RecordedObjective(search.objective(EXPLORE, 0), wraps, search.telling("search on robots", budget))
+    budget = _scaled_budget(EXPLORE.evaluations, settings)
+    recorder = RecordedObjective(
+        search.objective(EXPLORE, 0), wraps, search.progress_callback("search on robots", budget)
+    )
     starts = np.vstack([space.nearest(settings.begin), basins(explored, wraps, _BASINS)])
     recorder(np.concatenate(_at_periods(space, starts, EXPLORE.periods)))
     if not settings.refine:
         return recorder.found()
-    families = _suited(recorder, space, space.nearest(FAMILIES), PERIODS)
-    known = list(families.near_best(_FAMILY_WORTH).finalists(_FAMILIES, _NEAR, wraps))
+    families = _tune_times(recorder, space, space.nearest(FAMILIES), PERIODS)
+    known = list(families.near_best(_MIN_FAMILY_RATIO).finalists(_FAMILIES, _MIN_SPACING, wraps))
     return climb_basins(recorder, wraps, budget, settings.seed, EXPLORE.step, known, EXPLORE.abandon)
 
 
-def _suited(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
+def _tune_times(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
     """Improve each point (n, dimensions): take the best of the period changes, then the best change of one time."""
     tried = _at_periods(space, points, periods)
     # One call each: gaits worse than the best so far are evaluated on few robots only.
@@ -303,24 +305,24 @@ def _best_copies(copies: Sequence[np.ndarray], values: Sequence[np.ndarray]) -> 
 
 
 def _budget(settings: Settings) -> int:
-    return settings.evaluations or _usual(settings)
+    return settings.evaluations or _default_budget(settings)
 
 
-def _usual(settings: Settings) -> int:
+def _default_budget(settings: Settings) -> int:
     return EVALUATIONS[settings.method] // (4 if settings.robust else 1)
 
 
-def _scaled(evaluations: int, settings: Settings) -> int:
+def _scaled_budget(evaluations: int, settings: Settings) -> int:
     """Scale `evaluations` by the ratio of the chosen budget to the default one."""
-    return max(2 * POPULATION, round(evaluations * _budget(settings) / _usual(settings)))
+    return max(2 * POPULATION, round(evaluations * _budget(settings) / _default_budget(settings)))
 
 
 def _refine(search: SearchRun, objective: Objective, explored: Evaluated) -> Evaluated:
     """Run CMA-ES from the best explored point."""
     settings = search.settings
-    budget = _scaled(_FINAL, settings)
-    telling = search.telling("refine", budget, explored.best_value)
-    recorder = RecordedObjective(objective, settings.space.wraps, telling)
+    budget = _scaled_budget(_FINAL, settings)
+    progress_callback = search.progress_callback("refine", budget, explored.best_value)
+    recorder = RecordedObjective(objective, settings.space.wraps, progress_callback)
     climb_together(recorder, explored.best_point[None], budget, settings.seed, [_FINAL_STEP])
     return recorder.found()
 
@@ -329,14 +331,14 @@ def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]
     """Run CMA-ES in rounds with more and more robots, each from the end points of the previous round, ranked again on
     the new robots: the best on few robots may be so by chance."""
     settings, wraps = search.settings, search.settings.space.wraps
-    ended = explored.finalists(_STARTS, APART, wraps) if explored.ends is None else explored.ends.points
+    ended = explored.finalists(_STARTS, BASIN_SPACING, wraps) if explored.ends is None else explored.ends.points
     found = []
     for number, stage in enumerate(_REFINE, start=1):
-        budget = _scaled(stage.evaluations, settings)
-        telling = search.telling(f"refine {number}", budget)
-        recorder = RecordedObjective(search.objective(stage, number), wraps, telling)
-        best = _suited(recorder, settings.space, ended, stage.periods)
-        begun = best.near_best(_END_WORTH).finalists(stage.climbs, APART, wraps)
+        budget = _scaled_budget(stage.evaluations, settings)
+        progress_callback = search.progress_callback(f"refine {number}", budget)
+        recorder = RecordedObjective(search.objective(stage, number), wraps, progress_callback)
+        best = _tune_times(recorder, settings.space, ended, stage.periods)
+        begun = best.near_best(_MIN_END_RATIO).finalists(stage.climbs, BASIN_SPACING, wraps)
         if not len(begun):
             break
         steps = [stage.step] * len(begun)
@@ -345,30 +347,30 @@ def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]
     return found
 
 
-def _nominally(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:
+def _fastest_finalist(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:
     """Return the fastest finalist by the finer metric, with its speed. Many fail, because the fastest gaits are at a
     cliff; if none reaches half of the best explored value, finalists further apart and then slower copies are tried."""
     space, rows, speeds = search.settings.space, np.empty((0, 6)), np.empty(0)
-    near, far = (explored.finalists(_NOMINAL_FINALISTS, apart=apart) for apart in (_NEAR, _FAR))
+    near, far = (explored.finalists(_NOMINAL_FINALISTS, apart=apart) for apart in (_MIN_SPACING, _WIDE_SPACING))
     slower = np.concatenate([space.slower(points, share) for points in (near, far) for share in _SLOWER])
     for points in (near, far, slower):
         more = gait_rows(space.gaits(points))
-        rows, speeds = np.vstack([rows, more]), np.append(speeds, search.finely(more))
+        rows, speeds = np.vstack([rows, more]), np.append(speeds, search.fine_speeds(more))
         search.on_progress("verify", 0.5, float(speeds.max()))
-        if speeds.max() > _PROMISED * explored.best_value:
+        if speeds.max() > _WALK_RATIO * explored.best_value:
             break
     best = int(np.argmax(speeds))
     if speeds[best] <= 0.0:
-        raise SearchError(_NONE_STANDS)
+        raise SearchError(_NO_FINALIST)
     return Gait(*rows[best].tolist()), float(speeds[best])
 
 
 def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated) -> tuple[Gait, float]:
-    """Return the first finalist that keeps `_KEPT` of the best value on robots the search did not use, and its speed.
-    Slower copies of the best one follow, in case all finalists are beyond the cliff. If none keeps that much, the best
-    of those that keep `_PROMISED` is taken, and failing that, the one with the highest mean speed."""
+    """Return the first finalist that keeps `_ACCEPT_RATIO` of the best value on robots the search did not use, and its
+    speed. Slower copies of the best one follow, in case all finalists are beyond the cliff. If none keeps that much,
+    the best of those that keep `_WALK_RATIO` is taken, and failing that, the one with the highest mean speed."""
     settings, space = search.settings, search.settings.space
-    finalists = refined.finalists(_ROBUST_FINALISTS, apart=_NEAR)
+    finalists = refined.finalists(_ROBUST_FINALISTS, apart=_MIN_SPACING)
     objective = search.objective(_SHORTLIST, 3)
     shortlist = np.concatenate(_at_periods(space, finalists, _SHORTLIST.periods))
     # One call each: gaits worse than the best so far are evaluated on few robots only, the hardest first.
@@ -379,26 +381,26 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
     checking = search.robots(_CHECKING_DRAWS, settings.seed + 2_500_000)
     metric = replace(settings.metric.in_full(), tolerance_m=FINE_M)
     # Relative to the best value of the shortlist, not to the gait's speed on the model, where it may have failed too.
-    least = max(_PROMISED * float(values.max()), STANDING_MM_S)
+    least = max(_WALK_RATIO * float(values.max()), STANDING_MM_S)
     near = np.concatenate([best, *(space.slower(best[:1], share) for share in _SLOWER)])
     # Finalists from elsewhere, used only if none of the above walks at all by the full metric.
-    far = explored.finalists(_NOMINAL_FINALISTS, apart=_FAR)
+    far = explored.finalists(_NOMINAL_FINALISTS, apart=_WIDE_SPACING)
     otherwise, most = None, (False, -1.0)
     for candidates in (near, far):
         rows = gait_rows(space.gaits(candidates))
-        for row, speed in zip(rows, search.finely(rows), strict=True):
+        for row, speed in zip(rows, search.fine_speeds(rows), strict=True):
             if speed <= 0.0:
                 continue
             speeds = distribution(search.runs, checking, row[None], metric)[0]
             low = float(np.quantile(speeds, _CHECK_QUANTILE * settings.share / QUANTILE))
             stands = low > least
-            if stands and low >= _KEPT * values.max():
+            if stands and low >= _ACCEPT_RATIO * values.max():
                 return Gait(*row.tolist()), float(speed)
             if (worth := (stands, low if stands else float(speeds.mean()))) > most:
                 otherwise, most = (Gait(*row.tolist()), float(speed)), worth
         if otherwise is not None:
             return otherwise
-    raise SearchError(_NONE_STANDS)
+    raise SearchError(_NO_FINALIST)
 
 
 def _at_periods(space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> list[np.ndarray]:

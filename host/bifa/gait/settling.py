@@ -11,11 +11,11 @@ import numpy as np
 from bifa.errors import BifaError
 
 WITHIN = 1e-3  # of the advance (at least 1 mm): by how much settled cycles may differ
-LEAST = 3  # settled cycles required
-MOST_CYCLES = 24  # that a walk may take to settle
+MIN_CYCLES = 3  # settled cycles required
+MAX_CYCLES = 24  # that a walk may take to settle
 STANDING_MM_S = 1.0  # a slower robot counts as standing still
 CAMERA_MM = 0.1  # standard deviation of a motion-capture position
-_SURE = 3.5  # standard deviations
+_N_SIGMA = 3.5  # standard deviations
 
 
 class Walking(StrEnum):
@@ -42,11 +42,11 @@ def settling(advance_mm: np.ndarray, noise_mm: float = 0.0) -> Settling:
     of the positions at the cycles' ends.
 
     From that cycle on no cycle differs from the mean, nor the later half of the cycles from the earlier half, by more
-    than `WITHIN` plus an allowance for the noise, and at least `LEAST` cycles are left.
+    than `WITHIN` plus an allowance for the noise, and at least `MIN_CYCLES` cycles are left.
     """
     advance_mm = np.asarray(advance_mm, dtype=float)
     count = len(advance_mm)
-    level = next((k for k in range(count - LEAST + 1) if _is_level(advance_mm[k:], noise_mm)), None)
+    level = next((k for k in range(count - MIN_CYCLES + 1) if _is_level(advance_mm[k:], noise_mm)), None)
     begins = count // 2 if level is None else level
     kept = advance_mm[begins:]
     varies = float(np.std(kept) / max(abs(float(np.mean(kept))), 1e-9)) if len(kept) else 0.0
@@ -61,7 +61,7 @@ def _is_level(advance_mm: np.ndarray, noise_mm: float) -> bool:
     # A cycle is the difference of two positions; the mean over half a walk is such a difference over `half` cycles.
     off = np.abs(advance_mm - mean).max()
     trend = abs(advance_mm[-half:].mean() - advance_mm[:half].mean())
-    return off <= allowed + _SURE * np.sqrt(2.0) * noise_mm and trend <= allowed + _SURE * 2.0 * noise_mm / half
+    return off <= allowed + _N_SIGMA * np.sqrt(2.0) * noise_mm and trend <= allowed + _N_SIGMA * 2.0 * noise_mm / half
 
 
 def walking(found: Settling, mean_mm_s: float) -> Walking:
@@ -111,15 +111,15 @@ def measured_speed(
     The displacement at a cycle's boundary is linearly interpolated; `noise_mm`, the standard deviation of a
     displacement (0 if simulated), enters a cycle's speed as sqrt(2) `noise_mm` / period.
 
-    Raises BifaError if the record is shorter than the `LEAST` cycles needed to judge whether the walk has settled.
+    Raises BifaError if the record is shorter than the `MIN_CYCLES` cycles needed to judge whether the walk has settled.
     """
     complete = complete_cycles(time_s, period_s)
     boundaries_s = time_s[0] + period_s * np.arange(complete + 1)
     advance_mm = np.diff(np.interp(boundaries_s, time_s, displacement_mm))
-    if complete < LEAST:
+    if complete < MIN_CYCLES:
         raise BifaError(
-            f"the walk has {complete} complete cycle(s) of {period_s:g} s; {LEAST} are needed to judge whether it has "
-            "settled: record a longer walk"
+            f"the walk has {complete} complete cycle(s) of {period_s:g} s; {MIN_CYCLES} are needed to judge whether it "
+            "has settled: record a longer walk"
         )
     return speed_of_cycles(advance_mm, period_s, noise_mm)
 
@@ -130,7 +130,7 @@ def complete_cycles(time_s: np.ndarray, period_s: float) -> int:
 
 
 def speed_of_cycles(advance_mm: np.ndarray, period_s: float, noise_mm: float = CAMERA_MM) -> MeasuredSpeed:
-    """Speed of a walk from the advance in each of its cycles, `LEAST` or more."""
+    """Speed of a walk from the advance in each of its cycles, `MIN_CYCLES` or more."""
     found = settling(advance_mm, noise_mm)
     cycles_mm_s = advance_mm[found.begins :] / period_s
     mean_mm_s = float(cycles_mm_s.mean())

@@ -55,7 +55,7 @@ class Knowledge:
 
         The draws are a scrambled Sobol sequence seeded with `seed`, so that few of them already cover the spread.
         """
-        own, moves = _own_values(model), _MOVES if self.scatter != self.scatter.timing else 0
+        own, moves = _own_values(model), _N_SHIFTS if self.scatter != self.scatter.timing else 0
         ways = self.factor.shape[1]
         size = ways + moves + len(own)
         power = max(0, int(np.ceil(np.log2(count))))
@@ -64,9 +64,9 @@ class Knowledge:
         draws, robots = _Draws(model, self.names), []
         drawn = normal[:, :ways] @ self.factor.T
         for off, amounts, turns in zip(drawn, normal[:, ways : ways + moves], unit[:, ways + moves :], strict=True):
-            robot = {name: model[name] for name in _MOVED} | draws.plain(off)
+            robot = {name: model[name] for name in _SHIFTED_PARAMETERS} | draws.plain(off)
             if moves:
-                _in_a_walk(robot, self.scatter, *amounts.tolist())
+                _shift_run(robot, self.scatter, *amounts.tolist())
             robot |= {
                 name: low + share * (high - low) for (name, (low, high)), share in zip(own.items(), turns, strict=True)
             }
@@ -111,7 +111,7 @@ def _words(scatter: Scatter) -> str:
     return ", ".join(said)
 
 
-def _in_a_walk(
+def _shift_run(
     robot: dict[str, float], scatter: Scatter, friction: float, positive: float, negative: float, force: float
 ) -> None:
     """Shift a robot's values by run-to-run and unexplained differences; the amounts are in standard deviations."""
@@ -123,8 +123,8 @@ def _in_a_walk(
     robot["body_area_N_psi"] *= 1.0 + scatter.force_N * force / push_N
 
 
-_MOVES = 4  # independent amounts of `_in_a_walk`
-_MOVED = ("mu_s", "mu_k", "supply_positive_psi", "supply_negative_psi", "body_area_N_psi")
+_N_SHIFTS = 4  # independent amounts of `_shift_run`
+_SHIFTED_PARAMETERS = ("mu_s", "mu_k", "supply_positive_psi", "supply_negative_psi", "body_area_N_psi")
 
 
 def _own_values(model: Model) -> Mapping[str, tuple[float, float]]:
@@ -154,8 +154,10 @@ class _Draws:
     def __init__(self, model: Model, names: Sequence[str]):
         self._model, self._values = model, model.values
         self._plain = [(k, name) for k, name in enumerate(names) if name in self._values]
-        self._springs = [_Spring(model.stiffness(curve), _members(names, curve)) for curve in STIFFNESS]
-        self._curves = {site: _Bent(curve, _members(names, f"{LEARNT}.{site}")) for site, curve in model.learnt.items()}
+        self._springs = [_SpringDraws(model.stiffness(curve), _members(names, curve)) for curve in STIFFNESS]
+        self._curves = {
+            site: _LearntCurveDraws(curve, _members(names, f"{LEARNT}.{site}")) for site, curve in model.learnt.items()
+        }
 
     def plain(self, off: np.ndarray) -> dict[str, float]:
         """Base and effect parameters by name; `off` (n,): deviation of each of the names."""
@@ -175,7 +177,7 @@ def _members(names: Sequence[str], owner: str) -> dict[str, int]:
     return {name.removeprefix(f"{owner}."): k for k, name in enumerate(names) if name.startswith(f"{owner}.")}
 
 
-class _Spring:
+class _SpringDraws:
     def __init__(self, curve: StiffnessCurve, members: Mapping[str, int]):
         self._places = list(members.values())
         powers = np.eye(len(curve.coefficients))[[int(power) for power in members]]
@@ -189,7 +191,7 @@ class _Spring:
             return self._family.at((0.0,) * len(self._places))
 
 
-class _Bent:
+class _LearntCurveDraws:
     """A learnt curve that deviates at its knots and, between them, by the natural cubic spline it was fitted as."""
 
     def __init__(self, curve: LearntCurve, members: Mapping[str, int]):

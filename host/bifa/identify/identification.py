@@ -160,9 +160,11 @@ def _open(
     prior_sd = {p.name: p.prior_sd for p in system.parameters}
     # parameters that the data determine hardly better than the prior count as open
     sd = {e.name: intervals[e.name].sd if e.name in intervals else e.sd for e in known.estimates}
-    told = {*dataset.known}
-    told |= {e.name for e in known.estimates if e.determined and sd[e.name] <= _SETTLED * (prior_sd[e.name] or np.inf)}
-    names = [n for n in identified.parameters if n not in told]
+    resolved = {*dataset.known}
+    resolved |= {
+        e.name for e in known.estimates if e.determined and sd[e.name] <= _SETTLED * (prior_sd[e.name] or np.inf)
+    }
+    names = [n for n in identified.parameters if n not in resolved]
     found = [Open(n, identified[n], _GIVEN_BY[n]) for n in names]
     for actuator, prefix in (("large", "body"), ("small", "small")):
         if prefix not in system.curves:

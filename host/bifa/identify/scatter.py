@@ -16,8 +16,8 @@ from bifa.robot.model import Scatter
 from lacuna.estimation.fit import Fit
 from lacuna.system import Channels, Record
 
-_AS_EXPECTED = 5  # weight of the prior, in runs that vary as expected beforehand
-_SIDE = 0.95  # quantile at the upper end of a 90 % interval
+_PRIOR_RUNS = 5  # weight of the prior, in runs that vary as expected beforehand
+_UPPER_QUANTILE = 0.95  # quantile at the upper end of a 90 % interval
 _LAST = 50  # samples of a walk, over which its end is averaged
 
 
@@ -72,8 +72,8 @@ def _between_runs(fit: Fit) -> float:
         for k, parameter in enumerate(parameters)
         if parameter.name == "friction_scale"
     ]
-    square = sum((value - 1.0) ** 2 for value in factors) + _AS_EXPECTED * FRICTION_WOBBLE**2
-    return float(np.sqrt(square / (len(factors) + _AS_EXPECTED)))
+    square = sum((value - 1.0) ** 2 for value in factors) + _PRIOR_RUNS * FRICTION_WOBBLE**2
+    return float(np.sqrt(square / (len(factors) + _PRIOR_RUNS)))
 
 
 def _unexplained(fit: Fit, experiments: Sequence[str], quantity: str) -> float:
@@ -115,15 +115,15 @@ def _speed(fit: Fit) -> float:
         share = np.array([_end(residual) / way_mm] if abs(way_mm) > 1.0 else [])
         return share[np.isfinite(share)]
 
-    return of_few(_shared(fit, (WALK,), off))
+    return sd_of_few(_shared(fit, (WALK,), off))
 
 
-def of_few(squares: Sequence[float]) -> float:
+def sd_of_few(squares: Sequence[float]) -> float:
     """Standard deviation from a few `squares`: that of the normal distribution with the same 90 % interval as Student's
     t for the next gait, since few gaits determine an RMS badly. 0 if there are none."""
     if not squares:
         return 0.0
-    wider = stdtrit(len(squares), _SIDE) / ndtri(_SIDE)
+    wider = stdtrit(len(squares), _UPPER_QUANTILE) / ndtri(_UPPER_QUANTILE)
     return float(wider * np.sqrt(max(float(np.mean(squares)), 0.0)))
 
 

@@ -64,7 +64,7 @@ def _refuse_completed(model: Model) -> None:
 
 
 def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
-    """Static fits of the actuators that were loaded at 0 psi, over the range that their step responses reach."""
+    """Static fits of the actuators loaded at 0 psi; step responses, if any, limit how far the curve is continued."""
     found = {}
     for actuator in _ACTUATORS:
         try:
@@ -110,8 +110,8 @@ def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
 
 
 def _rests(dataset: Dataset, actuator: str) -> np.ndarray:
-    """Rest positions [m] of every step response, under vacuum before the step and extended before the pressure is
-    released, and the measured pressures [psi] that held the actuator there; shape (n, 2)."""
+    """Positions [m] at which the actuator rests in step responses, before each switch and at the end of the record, and
+    the measured pressures [psi] that hold it there; shape (n, 2)."""
     found = []
     for trial in dataset.of("step_response", actuator):
         time_s = trial.time_s - trial.time_s[0]

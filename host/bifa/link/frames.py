@@ -147,23 +147,23 @@ class Splitter:
         parts: list[tuple[str, bytes]] = []
         for byte in data:
             if self._in_frame:
-                self._in_frame_byte(byte, parts)
+                self._feed_frame_byte(byte, parts)
             elif byte == 0:
                 self._in_frame = True
             elif byte == ord("\n"):
-                parts.append(self._taken_line())
+                parts.append(self._pop_line())
             else:
                 if len(self._line) >= self.LONGEST_LINE:
-                    parts.append(self._taken_line())
+                    parts.append(self._pop_line())
                 self._line.append(byte)
         return parts
 
-    def _taken_line(self) -> tuple[str, bytes]:
+    def _pop_line(self) -> tuple[str, bytes]:
         line = bytes(self._line).rstrip(b"\r")
         self._line.clear()
         return "line", line
 
-    def _in_frame_byte(self, byte: int, parts: list[tuple[str, bytes]]) -> None:
+    def _feed_frame_byte(self, byte: int, parts: list[tuple[str, bytes]]) -> None:
         if byte != 0:
             self._frame.append(byte)
         ended = byte == 0 and self._frame

@@ -29,7 +29,7 @@ Result = TypeVar("Result")
 
 CONFIRMED_WITHIN_S = 5.0
 FIRST_ATTEMPT_S = 0.25  # doubled at each further attempt: the computer may be slow rather than the cable bad
-STANDING = (STATES.index("stopped"), STATES.index("fault"))
+STOPPED_STATES = (STATES.index("stopped"), STATES.index("fault"))
 
 
 class Mover(Protocol):
@@ -39,13 +39,13 @@ class Mover(Protocol):
         """Send the stop, without waiting for anything."""
 
 
-_inside: list[Mover] = []
+_active_robots: list[Mover] = []
 _earlier_handlers: dict[int, Any] = {}
 _earlier_hook: list[Callable[..., Any]] = []
-_held: list[int] = []
-_again: list[threading.Timer] = []
+_deferred_signals: list[int] = []
+_retry_timers: list[threading.Timer] = []
 _parents: list[int] = []  # the parent's process id, while its death ends this program
-_whole: set[CodeType] = set()  # code of the functions that must not be interrupted
+_uninterruptible: set[CodeType] = set()  # code of the functions that must not be interrupted
 AGAIN_AFTER_S = 0.01
 _SET_DEATH_SIGNAL, _GET_DEATH_SIGNAL = 1, 2  # PR_SET_PDEATHSIG, PR_GET_PDEATHSIG of prctl(2)
 _DEATH: Any = getattr(signal, "SIGUSR2", None)  # a separate signal: it also comes if only a thread of the parent ends
@@ -58,59 +58,59 @@ def enter(robot: Mover) -> None:
     Signals that the program or `nohup` already handles differently are left alone. Outside the main thread, the only
     one that receives signals, no handlers are installed.
     """
-    if not _inside and threading.current_thread() is threading.main_thread():
-        for name, act in _ACTS.items():
+    if not _active_robots and threading.current_thread() is threading.main_thread():
+        for name, handler in _HANDLERS.items():
             number = getattr(signal, name, None)  # Windows has the first two, and SIGBREAK
             if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
-                _earlier_handlers[number] = signal.signal(number, act)
+                _earlier_handlers[number] = signal.signal(number, handler)
         _earlier_hook.append(sys.unraisablehook)
-        sys.unraisablehook = _end_again
+        sys.unraisablehook = _retry_interrupt
         _watch_parent()
-    _inside.append(robot)
+    _active_robots.append(robot)
 
 
 def leave(robot: Mover) -> None:
     """Restore the earlier signal handlers; `robot` has been stopped."""
-    _inside.remove(robot)
-    if not _inside and threading.current_thread() is threading.main_thread():
-        _watch_parent_no_more()
+    _active_robots.remove(robot)
+    if not _active_robots and threading.current_thread() is threading.main_thread():
+        _unwatch_parent()
         while _earlier_handlers:
             signal.signal(*_earlier_handlers.popitem())
         sys.unraisablehook = _earlier_hook.pop()
-        if _again:
-            _cancel_again()
-            _held.append(signal.SIGINT)
+        if _retry_timers:
+            _cancel_retries()
+            _deferred_signals.append(signal.SIGINT)
 
 
 def uninterrupted(function: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Decorate a function that must run to its end: a signal during it raises KeyboardInterrupt only afterwards. If the
-    function fails, its error is raised from a KeyboardInterrupt, so that the caller does not retry."""
+    """Decorate a function that must run to its end: a signal during it raises KeyboardInterrupt only afterwards. If it
+    fails after such a signal, its error is raised from a KeyboardInterrupt, so that the caller does not retry."""
 
-    def whole(*args: Given.args, **kwargs: Given.kwargs) -> Result:
+    def wrapper(*args: Given.args, **kwargs: Given.kwargs) -> Result:
         try:
             result = function(*args, **kwargs)
         except Exception as error:
-            if not _held:
+            if not _deferred_signals:
                 raise
-            _held.clear()
+            _deferred_signals.clear()
             raise error from KeyboardInterrupt()
-        if _held:
-            _held.clear()
+        if _deferred_signals:
+            _deferred_signals.clear()
             raise KeyboardInterrupt
         return result
 
-    _whole.add(whole.__code__)
-    return functools.update_wrapper(whole, function)
+    _uninterruptible.add(wrapper.__code__)
+    return functools.update_wrapper(wrapper, function)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
     while frame is not None:
-        if frame.f_code in _whole:
-            _held.append(number)
+        if frame.f_code in _uninterruptible:
+            _deferred_signals.append(number)
             return
         frame = frame.f_back
-    _held.clear()
-    _cancel_again()
+    _deferred_signals.clear()
+    _cancel_retries()
     # Stop first: unwinding to the end of the command may take long, or block on a full pipe.
     _stop_all()
     raise KeyboardInterrupt
@@ -123,15 +123,15 @@ def _suspend(number: int, frame: FrameType | None) -> None:
 
 
 def _stop_all() -> None:
-    for robot in _inside:
+    for robot in _active_robots:
         with contextlib.suppress(ConnectionError):
             robot.send_stop()
 
 
-_ACTS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGBREAK": _end, "SIGTSTP": _suspend}
+_HANDLERS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGBREAK": _end, "SIGTSTP": _suspend}
 
 
-def _orphaned(number: int, frame: FrameType | None) -> None:
+def _on_parent_death(number: int, frame: FrameType | None) -> None:
     if os.getppid() != _parents[-1]:  # otherwise only the parent's thread has ended
         _end(number, frame)
 
@@ -142,11 +142,11 @@ def _watch_parent() -> None:
     if death_signal() != 0 or signal.getsignal(_DEATH) is not signal.SIG_DFL:
         return
     _parents.append(os.getppid())
-    signal.signal(_DEATH, _orphaned)
+    signal.signal(_DEATH, _on_parent_death)
     _prctl(_SET_DEATH_SIGNAL, int(_DEATH))
 
 
-def _watch_parent_no_more() -> None:
+def _unwatch_parent() -> None:
     if _parents:
         _prctl(_SET_DEATH_SIGNAL, 0)
         signal.signal(_DEATH, signal.SIG_DFL)
@@ -166,16 +166,16 @@ def _prctl(option: int, value: Any) -> int:
         return -1
 
 
-def _cancel_again() -> None:
-    while _again:
-        _again.pop().cancel()
+def _cancel_retries() -> None:
+    while _retry_timers:
+        _retry_timers.pop().cancel()
 
 
-def _end_again(lost: "sys.UnraisableHookArgs") -> None:
+def _retry_interrupt(lost: "sys.UnraisableHookArgs") -> None:
     """Raise a KeyboardInterrupt again that Python dropped, as it does in clean-up (`__del__`, a generator's end)."""
     if lost.exc_type is KeyboardInterrupt:
-        _again.append(threading.Timer(AGAIN_AFTER_S, signal.raise_signal, [signal.SIGINT]))
-        _again[-1].start()
+        _retry_timers.append(threading.Timer(AGAIN_AFTER_S, signal.raise_signal, [signal.SIGINT]))
+        _retry_timers[-1].start()
     else:
         _earlier_hook[-1](lost)
 
@@ -191,7 +191,7 @@ def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> No
         session.send_stop()
         try:
             status = ask(attempt_s)
-            if status["state"] in STANDING and status["valves"] == 0:
+            if status["state"] in STOPPED_STATES and status["valves"] == 0:
                 return
         except NoAnswerError as error:
             reason = error

@@ -6,8 +6,8 @@ from bifa.link.uno import Uno
 
 SETTLE_S = 0.05
 LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
-MOVING = ("run", "hold")
-REPLACING = ("set", "load", "defaults")  # these may change `host_timeout_s`
+MOVING_COMMANDS = ("run", "hold")
+PARAMETER_COMMANDS = ("set", "load", "defaults")  # these may change `host_timeout_s`
 
 
 def is_answer(line: str) -> bool:
@@ -40,15 +40,15 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
     if not line.replace("\t", " ").isprintable():
         return [f"error {line!r} contains characters that are not text; not sent"]
     word = (line.split() or [""])[0]
-    if word in MOVING:
+    if word in MOVING_COMMANDS:
         uno.may_move = True
-    lines = _answered(uno, line, clock)
-    if word in REPLACING:
+    lines = _send_and_wait(uno, line, clock)
+    if word in PARAMETER_COMMANDS:
         uno.parameters()  # reads `host_timeout_s`, and with it how often to keep the link alive
     return lines
 
 
-def _answered(uno: Uno, line: str, clock: Clock) -> list[str]:
+def _send_and_wait(uno: Uno, line: str, clock: Clock) -> list[str]:
     _drop_answers(uno)
     uno.session.transport.write(line.encode("ascii", "replace") + b"\n")
     deadline = clock.now() + LONGEST_ANSWER_S

@@ -89,7 +89,7 @@ class Uno:
         """`seed` makes the session's key reproducible (for tests in virtual time)."""
         self.session = Session(transport, clock, seed)
         self.session.on_sample = self._take_sample
-        self.session.on_renewed = self._stream_again
+        self.session.on_renewed = self._resume_stream
         self.may_move = False
         self.clock_relation = ClockRelation()
         self._clock = clock
@@ -148,7 +148,7 @@ class Uno:
     def exchange_clocks(self) -> None:
         """Add one measurement to `clock_relation`."""
         [answer] = self.session.call_all([("read_clock", ())])
-        uno_s = self._unwrap(answer.report["time_us"]) / 1e6
+        uno_s = self._unwrap_time(answer.report["time_us"]) / 1e6
         self.clock_relation.add(answer.sent_s - CLOCK_TICK_S, uno_s, answer.received_s)
         self._next_exchange_s = self._clock.now() + self._exchange_every_s
 
@@ -353,9 +353,9 @@ class Uno:
                 raise LinkError("the Uno streams no samples, so no strobe can be marked")
             self.session.poll(0.02)
         self.session.call("mark")
-        return _unwrapped(self.session.call("read_clock")["marked"], self._last_sample[1], self._last_sample)
+        return _unwrap_sequence(self.session.call("read_clock")["marked"], self._last_sample[1], self._last_sample)
 
-    def _stream_again(self) -> None:
+    def _resume_stream(self) -> None:
         if self._streaming:
             self.session.call("stream", 1)
 
@@ -382,10 +382,10 @@ class Uno:
     def _take_sample(self, report: frames.Report) -> None:
         self.counters.samples += 1
         self.may_move = self.may_move or report["valves"] != 0
-        time_us = self._unwrap(report["time_us"])
+        time_us = self._unwrap_time(report["time_us"])
         sequence = report["sequence"]
         if self._last_sample is not None:
-            sequence = _unwrapped(sequence, time_us, self._last_sample)
+            sequence = _unwrap_sequence(sequence, time_us, self._last_sample)
             if sequence <= self._last_sample[0]:
                 return  # a repeat
             self.counters.lost += sequence - self._last_sample[0] - 1
@@ -403,7 +403,7 @@ class Uno:
             )
         )
 
-    def _unwrap(self, time_us: int) -> int:
+    def _unwrap_time(self, time_us: int) -> int:
         """Unwrap the Uno's 32-bit microseconds, which wrap every 71.6 minutes. A time may be a little older than the
         previous one; after a longer silence, the host's clock tells how often the Uno's has wrapped."""
         now_s = self._clock.now()
@@ -424,7 +424,7 @@ def _psi(milli: tuple[int, int, int]) -> tuple[float, float, float]:
     return body / 1000, head / 1000, tail / 1000
 
 
-def _unwrapped(sequence: int, time_us: int, last: tuple[int, int]) -> int:
+def _unwrap_sequence(sequence: int, time_us: int, last: tuple[int, int]) -> int:
     """Unwrap the 16-bit number of a sample taken at `time_us`; `last`: number and time of the previous sample. Samples
     are a fixed time apart, so the times tell how many are missing in between."""
     due = last[0] + round((time_us - last[1]) / SAMPLE_US)

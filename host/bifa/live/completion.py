@@ -65,7 +65,7 @@ class LineCompleter(Completer):
         """See Completer."""
         before = document.text_before_cursor
         words = before.split()
-        begun = "" if not words or before.endswith(" ") else words.pop()
+        prefix = "" if not words or before.endswith(" ") else words.pop()
         for word, meta in words_after(words, self._known).items():
-            if word.startswith(begun):
-                yield Completion(word, start_position=-len(begun), display_meta=meta)
+            if word.startswith(prefix):
+                yield Completion(word, start_position=-len(prefix), display_meta=meta)

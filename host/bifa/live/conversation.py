@@ -40,11 +40,11 @@ class Conversation:
         """Send the real-time stop and drop all waiting lines; the thread then waits for the confirmation."""
         with contextlib.suppress(ConnectionError):  # the thread meets the same error, and ends
             self.uno.send_stop()
-        if dropped := self._dropped():
+        if dropped := self._drop_waiting():
             print(f"-- not carried out: {', '.join(dropped)}")
         self._is_stopping = True
 
-    def _dropped(self) -> list[str]:
+    def _drop_waiting(self) -> list[str]:
         """Remove and return the typed lines that have not begun."""
         lines: list[str | None] = []
         with contextlib.suppress(queue.Empty):
@@ -70,7 +70,7 @@ class Conversation:
     def _run(self) -> None:
         pace = Pace(self._clock)
         try:
-            self._look()
+            self._start_telemetry()
             while self._round():
                 pace.wait()
         except AbandonedError:
@@ -98,7 +98,7 @@ class Conversation:
         except RestartedError:
             self.uno.connect()
             settle(self.uno, self._clock)
-            self._look()
+            self._start_telemetry()
             print("-- the Uno restarted, all valves off; connected again, with its start preset")
         return line is not None
 
@@ -108,15 +108,15 @@ class Conversation:
         except NoAnswerError as error:
             lines = [f"-- {error}"]
         try:
-            self._learn()  # first, so that completion is up to date when the answer appears
+            self._update_known()  # first, so that completion is up to date when the answer appears
         finally:
             print("\n".join(lines))
 
-    def _look(self) -> None:
-        self._learn()
+    def _start_telemetry(self) -> None:
+        self._update_known()
         self.uno.stream(True)
 
-    def _learn(self) -> None:
+    def _update_known(self) -> None:
         """Read what completion offers."""
         self.known.parameters = self.uno.parameters()
         self.known.presets = self.uno.presets()

@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from bifa.gait.settling import LEAST, MOST_CYCLES, speed_of_cycles
+from bifa.gait.settling import MAX_CYCLES, MIN_CYCLES, speed_of_cycles
 
 
 class CycleSpeed:
@@ -18,7 +18,7 @@ class CycleSpeed:
 
     def _begin(self) -> None:
         self.path: deque[tuple[float, float, float]] = deque()  # cycles, time, position over the last cycle
-        self._ends: deque[tuple[float, float]] = deque(maxlen=MOST_CYCLES + 1)  # ends of cycles: time, position
+        self._ends: deque[tuple[float, float]] = deque(maxlen=MAX_CYCLES + 1)  # ends of cycles: time, position
         self._phase_rad: float | None = None
         self._cycles = 0.0
         self.settled = ""
@@ -32,8 +32,8 @@ class CycleSpeed:
         before, self._phase_rad = self.path[-1] if self.path else None, phase_rad
         self.path.append((self._cycles, time_s, position_mm))
         if before is not None and math.floor(self._cycles) > math.floor(before[0]):
-            self._ends.append(_between(before, self.path[-1], float(math.floor(self._cycles))))
-            if len(self._ends) > LEAST:
+            self._ends.append(_interpolate(before, self.path[-1], float(math.floor(self._cycles))))
+            if len(self._ends) > MIN_CYCLES:
                 lasts_s, advance_mm = np.diff(np.array(self._ends), axis=0).T
                 self.settled = speed_of_cycles(advance_mm, float(lasts_s.mean())).text
         while len(self.path) > 2 and self.path[1][0] <= self._cycles - 1.0:
@@ -44,12 +44,14 @@ class CycleSpeed:
         """Speed over the last whole cycle, whose beginning is interpolated between two readings."""
         if not self.path or (began := self._cycles - 1.0) < self.path[0][0]:
             return None
-        then_s, then_mm = _between(self.path[0], self.path[1], began)
+        then_s, then_mm = _interpolate(self.path[0], self.path[1], began)
         _, now_s, now_mm = self.path[-1]
         return (now_mm - then_mm) / (now_s - then_s) if now_s > then_s else None
 
 
-def _between(early: tuple[float, float, float], late: tuple[float, float, float], cycles: float) -> tuple[float, float]:
+def _interpolate(
+    early: tuple[float, float, float], late: tuple[float, float, float], cycles: float
+) -> tuple[float, float]:
     """Interpolate time and position at `cycles`, between two readings."""
     (c0, t0, x0), (c1, t1, x1) = early, late
     share = (cycles - c0) / (c1 - c0) if c1 > c0 else 1.0

@@ -84,11 +84,11 @@ def _prompt(conversation: Conversation) -> PromptSession[str]:
         refresh_interval=0.2,
     )
 
-    def leave_with_the_link(app: Application[str]) -> None:
+    def exit_when_ended(app: Application[str]) -> None:
         if conversation.ended.is_set() and app.future is not None and not app.future.done():
             app.exit(exception=EOFError())
 
-    session.app.after_render += leave_with_the_link
+    session.app.after_render += exit_when_ended
     return session
 
 
@@ -97,7 +97,7 @@ def converse(uno: Uno, rig: Rig) -> None:
     print("type help; Tab completes; ! stops at once; Ctrl-D leaves, all valves off")
     conversation = Conversation(uno, rig)
     try:
-        _talk(conversation)
+        _read_lines(conversation)
     except KeyboardInterrupt:
         pass
     finally:
@@ -106,7 +106,7 @@ def converse(uno: Uno, rig: Rig) -> None:
         raise conversation.error
 
 
-def _talk(conversation: Conversation) -> None:
+def _read_lines(conversation: Conversation) -> None:
     session = _prompt(conversation)
     with patch_stdout():
         try:

@@ -17,11 +17,12 @@ from bifa.live.rounds import Latest, Pace
 from bifa.screen import Console
 
 REFRESH_S = 0.1
-_WIDEST, _NARROWEST, _BESIDE = 72, 8, 50  # characters: width of the trace, and of the columns beside it
+# Characters: width of the trace, and of the columns beside it.
+_MAX_TRACE_COLUMNS, _MIN_TRACE_COLUMNS, _OTHER_COLUMNS = 72, 8, 50
 COLORS = {"positive": "red", "vacuum": "blue", "off": "", "both": "bold white on red"}
 
 SHORTEST_S = 2.4  # least duration of the trace
-_MOST = 1200  # samples, one per picture: two minutes, twice the longest cycle
+_MAX_SAMPLES = 1200  # samples, one per picture: two minutes, twice the longest cycle
 BLOCKS = " ▁▂▃▄▅▆▇█"
 LOWEST_PSI, HIGHEST_PSI = -15.0, 15.0
 
@@ -36,7 +37,7 @@ class Trace:
     """Pressures over the last cycle of the body's oscillator, or over SHORTEST_S if longer, drawn at any width."""
 
     def __init__(self) -> None:
-        self._kept: deque[tuple[Sample, float]] = deque(maxlen=_MOST)  # with the cycles completed by then
+        self._kept: deque[tuple[Sample, float]] = deque(maxlen=_MAX_SAMPLES)  # with the cycles completed by then
 
     def take(self, sample: Sample) -> None:
         """Add the newest sample. If the Uno has restarted, so that its clock began again, drop all earlier ones."""
@@ -44,10 +45,10 @@ class Trace:
             self._kept.clear()
         done = self._kept[-1][1] + _cycles(self._kept[-1][0], sample) if self._kept else 0.0
         self._kept.append((sample, done))
-        while self._spare():
+        while self._has_surplus():
             self._kept.popleft()
 
-    def _spare(self) -> bool:
+    def _has_surplus(self) -> bool:
         """Whether the oldest sample is needed neither for a whole cycle nor for the shortest duration."""
         if len(self._kept) < 3:
             return False
@@ -100,7 +101,7 @@ class Monitor:
     def draw(self, columns: int) -> Panel:
         """Draw the present state, `columns` characters wide; in fewer, the last cycle is drawn more coarsely."""
         sample = self._latest.sample
-        width = max(_NARROWEST, min(_WIDEST, columns - _BESIDE))
+        width = max(_MIN_TRACE_COLUMNS, min(_MAX_TRACE_COLUMNS, columns - _OTHER_COLUMNS))
         table = Table(box=None, pad_edge=False)
         for heading in ("chamber", "psi", f"last {self._trace.seconds:.1f} s", "valves", "phase"):
             table.add_column(heading, no_wrap=True)

@@ -18,7 +18,7 @@ from rich.status import Status
 from bifa.errors import BifaError
 from bifa.link import RefusedError, Sample, Uno
 from bifa.link.table import CHAMBERS, MARK_PAUSE
-from bifa.live.walk import look_for_a_reader
+from bifa.live.walk import raise_if_no_reader
 from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.printable import counted
@@ -26,7 +26,7 @@ from bifa.rig import GONE, RETRY_S, Rig, SameBoard
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
 
-RESTARTS = 3  # most restarts of a board while its port is away; each increments its boot number
+MAX_RESTARTS = 3  # most restarts while the port is away; a board that keeps its power counts each in its boot number
 HEADER = [
     "time_s",
     "host_time_s",
@@ -47,7 +47,7 @@ def record_walks(
     rig: Rig, port: str | None, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console
 ) -> None:
     """Record `repeats` walks into the data set `out`; an interrupted session resumes where it stopped."""
-    from bifa.gait.settling import LEAST, Walking, measured_speed
+    from bifa.gait.settling import MIN_CYCLES, Walking, measured_speed
     from bifa.measure.bench_file import known_of
     from bifa.measure.plan import walks
     from bifa.measure.session import Event, provenance, run_session
@@ -63,7 +63,7 @@ def record_walks(
                 progress.console.print(warning(event.misfit))
             if event.link is not None:
                 progress.console.print(f"walk {event.number}: {event.link.text()}")
-            if event.trial is not None and cycles >= LEAST:
+            if event.trial is not None and cycles >= MIN_CYCLES:
                 columns = event.trial.columns
                 speed = measured_speed(columns["time_s"], columns["displacement_head_mm"], gait.gait.period_s)
                 more = f"; walk it with --cycles {2 * cycles}" if speed.walking is Walking.UNSETTLED else ""
@@ -134,7 +134,7 @@ class _TelemetryLog:
         return self._nonce is not None
 
     def record_until_gone(self, path: Path) -> None:
-        """Record into the new file `path`; raises one of GONE when the Uno is disconnected."""
+        """Record into the new file `path`; raises one of GONE when the link to the Uno is lost."""
         uno: Uno | None = None
         try:
             with self._board.open() as rig, self._console.status("waiting for the Uno") as status:
@@ -158,7 +158,7 @@ class _TelemetryLog:
     def _greet(self, uno: Uno) -> str:
         """Connect; return in words whether this is known to be the board that was recorded before."""
         nonce = uno.connect().boot_nonce
-        followed = self._nonce is not None and 0 <= (nonce - self._nonce) % 65536 <= RESTARTS
+        followed = self._nonce is not None and 0 <= (nonce - self._nonce) % 65536 <= MAX_RESTARTS
         self._nonce = nonce
         if self._board.serial_number or followed:
             return "The Uno is back and has restarted"
@@ -178,13 +178,13 @@ class _TelemetryLog:
                 writer.writerows(telemetry_row(uno, sample, marked) for sample in uno.samples(0.5))
                 file.flush()
                 if self._parameters:  # at rest, recording continues even if nobody reads the output
-                    look_for_a_reader()
+                    raise_if_no_reader()
                 status.update(f"recording  {uno.counters.text()}")
-                self._walk_if_told(uno)
+                self._walk_if_confirmed(uno)
         finally:
             writer.writerows(telemetry_row(uno, sample, marked) for sample in uno.taken_samples())
 
-    def _walk_if_told(self, uno: Uno) -> None:
+    def _walk_if_confirmed(self, uno: Uno) -> None:
         if not self._desk.is_asking or (answer := self._desk.answer()) is None:
             return
         if answer:

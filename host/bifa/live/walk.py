@@ -25,7 +25,7 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
     pace, end_s = Pace(clock), math.inf if duration_s is None else began_s + duration_s
     while (left_s := end_s - clock.now()) > 0:
         uno.samples(min(left_s, LOOK_EVERY_S))
-        look_for_a_reader()
+        raise_if_no_reader()
         status = uno.status()
         if status.state != "running":
             raise LinkError(
@@ -37,7 +37,7 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
         pace.wait()
 
 
-def look_for_a_reader() -> None:
+def raise_if_no_reader() -> None:
     """Raise BrokenPipeError if nobody reads stdout; walking prints nothing, so a closed pipe would go unnoticed."""
     if not hasattr(select, "poll"):
         return

@@ -18,8 +18,8 @@ from bifa.link.table import MARK_PAUSE
 MIN_EDGES = 20
 MAX_RMS_S = 2e-3
 MAX_DRIFT = 0.01  # the Uno's resonator is good to 0.5 %
-_OFF_GRID = 0.4  # largest deviation of an edge from the strobe's grid, in periods
-_FOLLOW = 0.2  # loop gain: share of an edge's deviation carried over to the next expected edge
+_MAX_GRID_ERROR = 0.4  # largest deviation of an edge from the strobe's grid, in periods
+_LOOP_GAIN = 0.2  # loop gain: share of an edge's deviation carried over to the next expected edge
 SLOWEST_S = 0.0205  # longest period of a camera: 50 samples a second
 LONGEST_GAP_S = 0.035  # longest gap that is interpolated: two samples missing at 100 a second
 _RESTART_PERIODS = 5  # a restart takes the bootloader's second; edges are not lost in such numbers
@@ -54,7 +54,7 @@ def align(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndarray, marked: i
     the pairs do not lie on a line with a plausible drift: nothing is guessed.
     """
     gaps = _gaps(sync_s)
-    pauses = np.flatnonzero(np.abs(gaps - (MARK_PAUSE + 1)) < _OFF_GRID)
+    pauses = np.flatnonzero(np.abs(gaps - (MARK_PAUSE + 1)) < _MAX_GRID_ERROR)
     if len(pauses) > 1:
         raise AlignmentError(
             f"the sync edges show {len(pauses)} pauses of {MARK_PAUSE} strobes, so it is not clear which one belongs "
@@ -149,13 +149,13 @@ def _numbers(sync_s: np.ndarray) -> np.ndarray:
     for i in range(1, len(sync_s)):
         periods = (sync_s[i] - due_s) / period_s
         step = round(periods)
-        if step < 1 or abs(periods - step) > _OFF_GRID:
+        if step < 1 or abs(periods - step) > _MAX_GRID_ERROR:
             raise AlignmentError(
                 f"sync edge {i} is {periods:.2f} periods of the strobe after the one before: check the sync wiring "
                 "(D10, ground, a threshold of about 2.5 V), then repeat"
             )
         places[i] = places[i - 1] + step
-        due_s += period_s * (step + _FOLLOW * (periods - step))
+        due_s += period_s * (step + _LOOP_GAIN * (periods - step))
     return places
 
 

@@ -29,7 +29,7 @@ from bifa.rig import Rig
 from bifa.robot.parameters import BASE_PARAMETERS, ModelParameterError
 from bifa.toml import parse_toml
 
-ASKED = {
+QUESTIONS = {
     "head_mass_kg": "mass of the head half, in kg",
     "tail_mass_kg": "mass of the tail half, in kg",
     "supply_positive_psi": "positive supply at the valves, gauged, in psi",
@@ -77,7 +77,7 @@ def read_bench(path: Path) -> dict[str, float]:
         raise BenchFileError(f"{path}: {error}") from None
 
 
-def known_on(path: Path, desk: Desk) -> dict[str, float]:
+def load_or_ask_known(path: Path, desk: Desk) -> dict[str, float]:
     """Return the known values of the bench; if its file does not have them, ask at the desk and write them to it."""
     document, before = _read(path) if path.exists() else ({}, "")
     if "known" in document:
@@ -85,8 +85,8 @@ def known_on(path: Path, desk: Desk) -> dict[str, float]:
     desk.say(f"Which of these have you measured directly? You are asked once; the answers are kept in {path}.")
     known: dict[str, float] = {}
     try:
-        for name, meaning in ASKED.items():
-            known |= _asked(desk, name, meaning)
+        for name, meaning in QUESTIONS.items():
+            known |= _ask(desk, name, meaning)
     finally:
         desk.clear()
     write_text(path, tomli_w.dumps({"known": known}) + (f"\n{before}" if before else ""))
@@ -94,7 +94,7 @@ def known_on(path: Path, desk: Desk) -> dict[str, float]:
     return known
 
 
-def _asked(desk: Desk, name: str, meaning: str) -> dict[str, float]:
+def _ask(desk: Desk, name: str, meaning: str) -> dict[str, float]:
     while True:
         desk.ask("known", f"{name}: {meaning}? Enter: not measured.", {"name": name})
         while (answer := desk.answer()) is None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from bifa.check import check_trial
-from bifa.check.lag import misfit_of
+from bifa.check.lag import trial_misfit
 from bifa.data import DatasetWriter, Trial
 from bifa.data.export import Export
 from bifa.data.layout import RAW
@@ -87,7 +87,7 @@ class ByHand:
         for line in text_plot(trial, self._plain, self._columns):
             self._desk.say(line)
         wrong = [str(finding) for finding in check_trial(trial)]
-        if misfit := misfit_of(trial, writer.trials):
+        if misfit := trial_misfit(trial, writer.trials):
             wrong.append(misfit)
         seen = "\n".join(f"Looks wrong: {text}" for text in wrong) or "Nothing looks wrong."
         return self._review(bench, uno, turn, seen, "Enter keeps it, r repeats it", wrong)

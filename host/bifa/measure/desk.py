@@ -2,7 +2,7 @@
 
 Answers are lines typed at the terminal. With a watched folder, each question is also written to `next.toml` there, and
 a file `answer` answers it (its text is the line; an empty file is Enter); bifa deletes that file. Answers given before
-a question was asked are ignored, except for a stop, which counts at any time.
+a question was asked are ignored (but for a pipe's), except for a stop, which counts at any time.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bifa.screen import Countdown
 
 ASKS, ANSWER = "next.toml", "answer"
-_LONGEST = 4096  # bytes of an answer in a file
+_MAX_ANSWER_BYTES = 4096  # bytes of an answer in a file
 STOP = ("q", "quit", "stop", "!")  # accepted at any question, and between questions
 _END = None
 
@@ -50,7 +50,7 @@ class Desk:
         self._is_stopped = False
 
     def ask(self, step: str, text: str, about: Mapping[str, Any] | None = None) -> None:
-        """Ask the question `text`. Answers to earlier questions are discarded, except for a stop.
+        """Ask the question `text`. Lines typed before at a terminal are discarded, except for a stop.
 
         `about`: further information for scripts, as plain values.
         """
@@ -58,7 +58,7 @@ class Desk:
         if not self._is_listening:
             self._is_listening = True
             threading.Thread(target=read_lines, args=(self._lines,), daemon=True).start()
-        self._forget()
+        self._discard_early()
         self.is_asking = True
         if self._watch is not None:
             write_text(self._watch / ASKS, tomli_w.dumps({"step": step, "asks": text, **(about or {})}))
@@ -69,7 +69,7 @@ class Desk:
 
         Raises KeyboardInterrupt if the answer is a stop, NobodyError if stdin is closed and no folder is watched.
         """
-        text = self._taken()
+        text = self._next_answer()
         if self._is_stopped or (text is not None and _is_stop(text)):
             raise KeyboardInterrupt
         self.is_asking = self.is_asking and text is None
@@ -84,7 +84,7 @@ class Desk:
         """Raise KeyboardInterrupt if a stop was entered between questions; does nothing while a question is open."""
         if self.is_asking or not self._is_listening:
             return
-        self._forget()
+        self._discard_early()
         if self._is_stopped:
             raise KeyboardInterrupt
 
@@ -93,7 +93,7 @@ class Desk:
         if self._countdown is not None:
             self._countdown.show(what, left_s)
 
-    def _taken(self) -> str | None:
+    def _next_answer(self) -> str | None:
         if self._watch is not None and (text := _from_file(self._watch / ANSWER)) is not None:
             return text
         try:
@@ -119,7 +119,7 @@ class Desk:
         if self._countdown is not None:
             self._countdown.close()
 
-    def _forget(self) -> None:
+    def _discard_early(self) -> None:
         """Discard lines typed ahead at a terminal, which must not start anything, but keep those of a pipe, which are
         meant for later questions. A stop among the discarded ones is remembered."""
         early = [_from_file(self._watch / ANSWER)] if self._watch is not None else []
@@ -138,7 +138,7 @@ def _is_stop(line: str) -> bool:
 
 def _from_file(path: Path) -> str | None:
     try:
-        text = path.read_bytes()[:_LONGEST].decode("utf-8", "replace").strip()
+        text = path.read_bytes()[:_MAX_ANSWER_BYTES].decode("utf-8", "replace").strip()
         path.unlink()
     except OSError:
         return None

@@ -20,7 +20,7 @@ from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.printable import counted
 
 CHAMBER_OF = {"large": "body", "small": "head"}
-SETTLE_S = 6.0  # for a pressure to settle: six of the slowest time constants of about 1 s
+SETTLE_S = 6.0  # for a pressure to settle: over three of the slowest time constants, 1.7 s (1 / body_alpha_s_per_s)
 RELIEF_S = 12.0  # for a falling pressure: the regulator releases air more slowly
 
 # The second switch is 5 ms off the sampling grid of the first: together they are located to 5 ms instead of 10.
@@ -64,7 +64,7 @@ def _static(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress
     trial = planned.as_trial()
     chamber = CHAMBER_OF[trial.tested]
     _pressurise(bench, uno, chamber, trial.commanded_psi)
-    return _moved(bench, uno, on_progress, chamber, trial.commanded_psi, 2 * 54.0 / trial.commanded_mm_s)
+    return _record_motion(bench, uno, on_progress, chamber, trial.commanded_psi, 2 * 54.0 / trial.commanded_mm_s)
 
 
 def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
@@ -75,11 +75,11 @@ def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
     _pressurise(bench, uno, "head", SNAP_PSI)
     if psi != SNAP_PSI:
         _pressurise(bench, uno, "head", psi, RELIEF_S if psi < SNAP_PSI else SETTLE_S)
-    columns, extra, lost = _moved(bench, uno, on_progress, "head", psi, PULL_MM / trial.commanded_mm_s)
+    columns, extra, lost = _record_motion(bench, uno, on_progress, "head", psi, PULL_MM / trial.commanded_mm_s)
     return columns, extra | EXTENDED, lost
 
 
-def _moved(
+def _record_motion(
     bench: Bench, uno: Uno, on_progress: Progress, chamber: str, pressure_psi: float, expected_s: float
 ) -> Recorded:
     """Record a motion of the cross-head, which takes about `expected_s`, while `chamber` is held as `_pressurise` left

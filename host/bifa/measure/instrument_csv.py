@@ -41,7 +41,7 @@ Columns = Mapping[str, np.ndarray]
 
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
-_BEYOND = 500.0  # mm or N, more than any actuator reaches: 999 in a small unit may be a real measurement
+_MAX_PLAUSIBLE = 500.0  # mm or N, more than any actuator reaches: 999 in a small unit may be a real measurement
 _HEAD, _TAIL = "displacement_head_mm", "displacement_tail_mm"
 _REPAIR = "(a lost marker?); fill the gap with the instrument's own software, or record again"
 _LOST = f"no value {_REPAIR}"
@@ -132,7 +132,7 @@ def read_instrument(
     for name in columns.keys() - {"time_s"}:
         called = (export or OWN_NAMES).columns.get(name, name)
         written = sheet.numbers(sheet.find(called), called)[rows]  # in the file's unit: in mm, -999 m is not a code
-        if (coded := codes(written) & (np.abs(columns[name]) > _BEYOND)).any():
+        if (coded := codes(written) & (np.abs(columns[name]) > _MAX_PLAUSIBLE)).any():
             row = int(np.argmax(coded))
             raise sheet.error(f"{written[row]:g} is a code for a missing value {_REPAIR}", rows[row], name)
     if export is None or (export.needs_sync_file and export.units.get("time_s") != DATE):

@@ -82,7 +82,7 @@ class OwnInstruments:
         self._declared: Mapping[str, Export] = {}
         self._before: dict[Path, Signature] = {}
         self._wrong = ""
-        self._told: dict[Path, Signature] = {}
+        self._reported: dict[Path, Signature] = {}
         self._turn: Turn  # this and `_kept` are set by `begin`
         self._kept: Path
         self._step = ""
@@ -112,7 +112,7 @@ class OwnInstruments:
 
     def start(self) -> None:
         """See Instruments."""
-        self._known, self._told = dict(self._signatures()), dict(self._alone())
+        self._known, self._reported = dict(self._signatures()), dict(self._incomplete_files())
         self._before = dict(self._known)
         machine = ROLES[self._experiment] == MACHINE  # a testing machine, which moves and measures, not a camera
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
@@ -137,7 +137,7 @@ class OwnInstruments:
         """See AskedInstruments. Raises KeyboardInterrupt if the answer is a stop. If Enter is expected, any other text
         is rejected."""
         if self._reading is not None:
-            return self._taken()
+            return self._poll_reading()
         if self._step in ("move", "save") and self._watch is not None and self._take_new():
             return True
         if self._step in ("", "saved"):
@@ -222,7 +222,7 @@ class OwnInstruments:
                     parts = (path, sync) if self._needs_sync_file else (path,)
                     yield path, tuple(_signature(part) for part in parts)
 
-    def _alone(self) -> Iterator[tuple[Path, Signature]]:
+    def _incomplete_files(self) -> Iterator[tuple[Path, Signature]]:
         """Files that are not, or not yet, part of a complete record."""
         whole = {path for path, _ in self._signatures()}
         whole |= {sync_file(path) for path in whole}
@@ -238,12 +238,12 @@ class OwnInstruments:
             return (".csv",)
         return (".xlsx",) if self._export.form.format == "xlsx" else TEXT_SUFFIXES
 
-    def _tell_of_others(self) -> None:
+    def _report_unusable(self) -> None:
         """Report new files that cannot be used, once for each version of a file."""
-        for path, signature in self._alone():
-            if self._told.get(path) != signature and self._is_settled(path, signature):
-                self._told[path] = signature
-                self._desk.say(self._why_not(path))
+        for path, signature in self._incomplete_files():
+            if self._reported.get(path) != signature and self._is_settled(path, signature):
+                self._reported[path] = signature
+                self._desk.say(self._explain_unusable(path))
 
     def _is_settled(self, path: Path, signature: Signature) -> bool:
         """Whether a file has stayed unchanged for long enough to be complete."""
@@ -253,7 +253,7 @@ class OwnInstruments:
             return False
         return time.monotonic() - since_s >= SETTLED_S
 
-    def _why_not(self, path: Path) -> str:
+    def _explain_unusable(self, path: Path) -> str:
         if _is_sync(path):
             return f"Found {path}, but not yet the record that it belongs to: save that, too."
         if path.suffix.lower() in self._suffixes:
@@ -268,7 +268,7 @@ class OwnInstruments:
     def _take_new(self) -> bool:
         """Take a file that has appeared since the start, once it is complete; report an unusable one once."""
         self._take_correction()
-        self._tell_of_others()
+        self._report_unusable()
         for path, signature in self._signatures():
             if self._known.get(path) != signature and self._is_settled(path, signature):
                 self._known[path] = signature
@@ -303,14 +303,14 @@ class OwnInstruments:
 
     def _take(self, path: Path) -> bool:
         self._reading = self._reader.submit(self._read, path)
-        return self._taken()
+        return self._poll_reading()
 
     def _read(self, path: Path) -> _Record:
         columns, edges = read_instrument(path, CHANNELS[self._experiment], self._export)
         self._refuse_earlier(path)
         return path, {**columns, "sync_time_s": edges}
 
-    def _taken(self) -> bool:
+    def _poll_reading(self) -> bool:
         """Whether the file being read has turned out to be the record; reading a workbook may take many seconds."""
         assert self._reading is not None
         try:

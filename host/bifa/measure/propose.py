@@ -24,11 +24,11 @@ from bifa.measure.instruments import CHANNELS
 from lacuna.decimals import number
 
 ROWS_SHOWN = 3
-_LOOKED_AT = 400  # lines that are inspected
-_MOST_BYTES = 1 << 18
-_MOST_HEADS = 6
-_MAY_HAVE = ("time_s", "displacement_mm", "displacement_head_mm", "force_N")
-_MEANS = {  # names that a column may have, in the languages of the presets
+_MAX_LINES = 400  # lines that are inspected
+_MAX_BYTES = 1 << 18
+_MAX_HEADER_ROWS = 6
+_COMMON_COLUMNS = ("time_s", "displacement_mm", "displacement_head_mm", "force_N")
+_NAME_PATTERNS = {  # names that a column may have, in the languages of the presets
     "time_s": r"time|zeit|temps|millis|micros|stamp|frame|x_value|^t$",
     "displacement": r"displ|exten|stroke|posi|weg|verl|course|cross|^x$|/ x$| x$",
     "force": r"force|load|kraft|last|charge",
@@ -52,14 +52,14 @@ class Look:
     def guess(self, name: str) -> str | None:
         """Guess which column may be `name` of the data set; None if no name fits."""
         kind = "time_s" if name == "time_s" else name.split("_")[0]
-        found = [label for label in self.sheet.labels() if re.search(_MEANS[kind], label, re.IGNORECASE)]
+        found = [label for label in self.sheet.labels() if re.search(_NAME_PATTERNS[kind], label, re.IGNORECASE)]
         return found[0] if found else None
 
     def unit(self, name: str, column: str) -> str | None:
         """Return the unit that the file itself gives for a column, if it is a possible unit of `name`."""
         place = self.sheet.find(column)
-        told = unit_in_file(self.sheet, place)
-        return told if told in units_for(name) else None
+        stated = unit_in_file(self.sheet, place)
+        return stated if stated in units_for(name) else None
 
 
 def wanted(role: str) -> list[str]:
@@ -97,7 +97,7 @@ def parsed(role: str, table: Mapping[str, Any]) -> Export:
 
 
 def _workbook(path: Path) -> dict[str, Any]:
-    cells = workbook(path, None, str(path))[1][:_LOOKED_AT]
+    cells = workbook(path, None, str(path))[1][:_MAX_LINES]
     run, first = _numbers(cells, ".")
     _refuse_short(path, run)
     return {"format": "xlsx"} | _heads(cells[:first], len(cells[first]))
@@ -129,16 +129,16 @@ def _refuse_short(path: Path, run: int) -> None:
 
 def _decoded(path: Path) -> tuple[str, list[str]]:
     try:
-        raw = read_bytes(path)[:_MOST_BYTES]
+        raw = read_bytes(path)[:_MAX_BYTES]
     except OSError as error:
         raise DatasetError(f"cannot be read ({error.strerror})", file=str(path)) from None
     marked = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
     encoding = "utf-16" if marked else "utf-8" if _is_utf8(raw) else "cp1252"
-    return encoding, raw.decode(encoding, "replace").removeprefix("\ufeff").splitlines()[:_LOOKED_AT]
+    return encoding, raw.decode(encoding, "replace").removeprefix("\ufeff").splitlines()[:_MAX_LINES]
 
 
 def _is_utf8(raw: bytes) -> bool:
-    is_whole = len(raw) < _MOST_BYTES  # otherwise it may be cut within a character
+    is_whole = len(raw) < _MAX_BYTES  # otherwise it may be cut within a character
     try:
         codecs.getincrementaldecoder("utf-8")().decode(raw, final=is_whole)
     except UnicodeDecodeError:
@@ -178,7 +178,7 @@ def _heads(above: Sequence[Sequence[str]], width: int) -> dict[str, Any]:
     """Keys that declare the rows of names, and of units, right above the numbers."""
     heads: list[Sequence[str]] = []
     for row in reversed(above):
-        if not 1 < len(row) <= width + 1 or not any(cell.strip() for cell in row) or len(heads) == _MOST_HEADS:
+        if not 1 < len(row) <= width + 1 or not any(cell.strip() for cell in row) or len(heads) == _MAX_HEADER_ROWS:
             break
         if row[0].strip() and heads and heads[0][0].strip() and not _is_of_units(heads[0]):
             break  # a line of the preamble, since the row below already names the first column
@@ -209,7 +209,7 @@ def _preset(path: Path, role: str) -> str | None:
         try:
             export = parsed(role, {"preset": name})
             sheet = Sheet(path, export.form)
-            found = {own for own in _MAY_HAVE if own in export.columns and sheet.has(export.columns[own])}
+            found = {own for own in _COMMON_COLUMNS if own in export.columns and sheet.has(export.columns[own])}
             if "time_s" in found and len(found) > 1 and len(sheet) and ("force_N" in found) == (role == "machine"):
                 return name
         except DatasetError:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import bifa
-from bifa.check.lag import misfit_of
+from bifa.check.lag import trial_misfit
 from bifa.data import Dataset, DatasetError, DatasetWriter, Trial
 from bifa.link import Uno
 from bifa.link.session import Counters
@@ -96,7 +96,7 @@ def run_session(
                 recorder = record or unattended
                 trial = recorder(rig, uno, planned, on_progress, number=number, total=len(trials), writer=writer)
                 writer.add(replace(trial, session_order=number))
-                link, misfit = uno.counters.since(before), misfit_of(trial, writer.trials[:-1])
+                link, misfit = uno.counters.since(before), trial_misfit(trial, writer.trials[:-1])
                 on_event(replace(event, share=1.0, trial=trial, link=link, misfit=misfit))
         return writer.finish()
 

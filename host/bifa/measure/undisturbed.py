@@ -22,8 +22,8 @@ def refuse_disturbed(samples: Sequence[Sample], state: str, held: Mapping[str, s
     """Raise DisturbedError unless the robot was in `state` in all of `samples`, with its valves as commanded.
 
     held: what each chamber is connected to throughout; None if commands change. A chamber that is switched is first
-    vented for a few milliseconds; if it was switched just before, as may happen at the start of a gait, it keeps its
-    supply until then. A gait's very first switches may precede the first sample.
+    vented for a few milliseconds; if it was switched just before, as may happen at the start of a gait, it first keeps
+    its former supply for a while. A gait's very first switches may precede the first sample.
     """
     if not samples:
         raise DisturbedError("the Uno sent no sample in that state: was it stopped at once?")
@@ -31,11 +31,11 @@ def refuse_disturbed(samples: Sequence[Sample], state: str, held: Mapping[str, s
         before = [one for one in samples[max(k - _SAMPLES, 0) : k] if sample.time_us - one.time_us <= _LATE_US]
         after_us = sample.time_us - samples[0].time_us
         unseen = _SUPPLIES if held is None and after_us <= _LATE_US else set()
-        if wrong := _wrong(before, unseen, sample, state, held):
+        if wrong := _describe_fault(before, unseen, sample, state, held):
             raise DisturbedError(f"{1e-6 * after_us:.2f} s after it began, {wrong}: the trial is not valid; repeat it")
 
 
-def _wrong(
+def _describe_fault(
     before: Sequence[Sample], unseen: set[str], sample: Sample, state: str, held: Mapping[str, str] | None
 ) -> str:
     """Describe what is wrong with a sample, given the samples just `before` and commands that may have been `unseen`;

@@ -40,8 +40,8 @@ class FittedCurve:
 
     @cached_property
     def shapes(self) -> np.ndarray:
-        shapes, told = self.fit.shapes()
-        return shapes if self.moves else shapes[told]
+        shapes, is_static = self.fit.shapes()
+        return shapes if self.moves else shapes[is_static]
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -68,17 +68,17 @@ class FittedCurve:
     def tables(self) -> Family:
         """The family of curves spanned by the shapes, as tables for the simulator."""
         none, ends = (0.0,) * len(self.shapes), (self.fit.lower_m, self.fit.upper_m)
-        return Family(self.curve(none), [StiffnessCurve(tuple(way), *ends) for way in self._ways])
+        return Family(self.curve(none), [StiffnessCurve(tuple(way), *ends) for way in self._power_shapes])
 
     @cached_property
     def changes(self) -> dict[str, dict[str, float]]:
         """The change in the coefficients of the model's curve per unit of each shape, by their names in a model."""
         return {
             name: {f"{self.prefix}_stiffness.{power}": float(change) for power, change in enumerate(way)}
-            for name, way in zip(self.names, self._ways, strict=True)
+            for name, way in zip(self.names, self._power_shapes, strict=True)
         }
 
     @cached_property
-    def _ways(self) -> list[np.ndarray]:
+    def _power_shapes(self) -> list[np.ndarray]:
         """The shapes' coefficients in powers of the normalised coordinate."""
         return [np.append(chebyshev.cheb2poly(shape), [0.0, 0.0])[: DEGREE + 1] for shape in self.shapes]

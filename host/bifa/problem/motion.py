@@ -12,7 +12,7 @@ _DIRECTION_WINDOW = 25  # samples: half a second at 50 Hz
 _SMOOTHING_WINDOW = 11
 _MARGIN = 17  # samples at either end of a stretch that may belong to its neighbour, given the direction's window
 _OFF = 5.0  # standard deviations from a line beyond which a sample is not on it
-_STRAIGHT = 1.2  # greatest residual of straight lines, over the noise estimated from differences of adjacent samples
+_MAX_NOISE_RATIO = 1.2  # greatest residual of lines, over the noise estimated from differences of adjacent samples
 
 _Line = tuple[float, float]  # level at time 0, slope
 
@@ -46,7 +46,7 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> ImposedMot
     for start, stop in _stretches(direction):
         if stop - start >= _SMOOTHING_WINDOW:
             smooth[start:stop] = moving_line(displacement_m[start:stop], _SMOOTHING_WINDOW)[0]
-    return _straight(time_s, displacement_m, direction) or ImposedMotion(smooth, direction)
+    return _fit_lines(time_s, displacement_m, direction) or ImposedMotion(smooth, direction)
 
 
 def moving_line(values: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +63,7 @@ def moving_line(values: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray
     )
 
 
-def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> ImposedMotion | None:
+def _fit_lines(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> ImposedMotion | None:
     """The motion as straight lines; None if it does not consist of such lines, that is, if their residuals exceed the
     noise estimated from differences of adjacent samples."""
     stretches = _stretches(direction)
@@ -79,7 +79,7 @@ def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndar
     level, slope = np.array(lines).T
     path = level[place] + slope[place] * time_s
     noise = np.sqrt(0.5 * np.mean(np.diff(displacement_m - path) ** 2))
-    if np.sqrt(np.mean((displacement_m - path) ** 2)) > _STRAIGHT * noise + 1e-9:
+    if np.sqrt(np.mean((displacement_m - path) ** 2)) > _MAX_NOISE_RATIO * noise + 1e-9:
         return None
     turns = [k for k, (before, after) in enumerate(pairwise(slope)) if before * after < 0.0]
     turned_s = tuple(corners[k] for k in turns)

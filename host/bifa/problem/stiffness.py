@@ -26,7 +26,7 @@ from lacuna.estimation.sampling import correlation_samples
 
 CONTINUATION = 0.13  # greatest width on either side, over the static range; beyond it the curve is straight
 _PRIOR_POINTS = 6  # on either side
-_TOLD = 0.9  # least share of the information from static loading for a shape to count as determined by it
+_MIN_STATIC_SHARE = 0.9  # least share of the information from static loading for a shape to count as determined by it
 _MIN_POINTS = 4 * (DEGREE + 1)
 
 
@@ -101,15 +101,15 @@ class StiffnessFit:
         """
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        told, turned = np.linalg.eigh(root.T @ self.static @ root)
+        static_share, turned = np.linalg.eigh(root.T @ self.static @ root)
         ways = []
-        for subspace in (turned[:, told < _TOLD], turned[:, told >= _TOLD]):
+        for subspace in (turned[:, static_share < _MIN_STATIC_SHARE], turned[:, static_share >= _MIN_STATIC_SHARE]):
             _, sizes, directions = np.linalg.svd((root @ subspace).T, full_matrices=False)
             ways.append(sizes[:, None] * directions)
         shapes = np.concatenate(ways)
         # Fix the signs, so that the coordinates do not depend on the linear algebra library.
         signs = np.sign(shapes[np.arange(len(shapes)), np.argmax(np.abs(shapes), axis=1)])
-        return shapes * signs[:, None], np.arange(len(shapes)) >= np.sum(told < _TOLD)
+        return shapes * signs[:, None], np.arange(len(shapes)) >= np.sum(static_share < _MIN_STATIC_SHARE)
 
     def _rows(self, x: np.ndarray, derivative: int = 0) -> np.ndarray:
         return _rows(x, self.lower_m, self.upper_m, derivative)

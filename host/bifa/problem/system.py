@@ -41,7 +41,7 @@ from lacuna.system import (
     Theta,
 )
 
-_REMEMBERED = ("_plant", "_own_values", "_unfitted", "_shapes")  # cached attributes of a system, not pickled
+_CACHES = ("_plant", "_own_values", "_unfitted", "_shapes")  # cached attributes of a system, not pickled
 FRICTION_WOBBLE = 0.01  # relative standard deviation of friction from run to run
 _ADC_COUNT_PSI = 30.0 / 819.0  # 10 bits, 10-90 % of the supply over +-15 psi
 _EXACT_M = {STATIC: 1e-6, STEP: 2e-7, ANCHOR: 1e-6, WALK: 3e-7}
@@ -57,9 +57,9 @@ _SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
 _WALL = ("wall_stiffness_N_m", "wall_damping_Ns_m")
 _MACHINE = {"displacement_mm": "the cross-head", "force_N": "the load cell"}  # what a testing machine measures
 _MASSES = ("head_mass_kg", "tail_mass_kg", "small_mass_kg")
-_FELT = {STAND_MASS: (STEP, "large"), LOAD_CELL: (ANCHOR, None)}
+_BENCH_TRIALS = {STAND_MASS: (STEP, "large"), LOAD_CELL: (ANCHOR, None)}
 # The parameters that each experiment depends on; `matters` adds the shapes of the curves.
-_SEEN_BY: dict[tuple[str, str | None], frozenset[str]] = {
+_DEPENDENCIES: dict[tuple[str, str | None], frozenset[str]] = {
     (STATIC, "large"): frozenset({"body_area_N_psi"}),
     (STATIC, "small"): frozenset({"small_area_N_psi"}),
     (STEP, "large"): frozenset({*_LARGE, "supply_negative_psi"}),
@@ -91,11 +91,11 @@ class RobotSystem(System):
         shapes = [p for curve in self.curves.values() for p in curve.parameters]
         # constants of the bench that these trials depend on and that were not declared
         felt = {(t.experiment, t.actuator) for t in dataset.trials if LOAD_CELL not in t.extra}
-        bench = (BENCH[name] for name, where in _FELT.items() if where in felt)
+        bench = (BENCH[name] for name, where in _BENCH_TRIALS.items() if where in felt)
         self.parameters = (*(self._named(name) for name in self.fitted), *bench, *shapes)
-        self._remember()
+        self._build_caches()
 
-    def _remember(self) -> None:
+    def _build_caches(self) -> None:
         self._plant = lru_cache(maxsize=512)(self._plant_of)
         self._own_values = _picked(self.fitted)
         self._unfitted = {name: p.value for name, p in self.model.parameters.items() if name not in self.fitted}
@@ -103,11 +103,11 @@ class RobotSystem(System):
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickling, without the caches."""
-        return {n: value for n, value in vars(self).items() if n not in _REMEMBERED}
+        return {n: value for n, value in vars(self).items() if n not in _CACHES}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self._remember()
+        self._build_caches()
 
     # -- the System protocol ----------------------------------------------------------------------------------
 
@@ -153,7 +153,7 @@ class RobotSystem(System):
                 if channels:
                     seen = sites.corrected_readings(dict(channels), learnt[k], case.inputs, case.plant)
                     found[k] = {name: seen[name] for name in trials[k].channels}
-        return [found[k] if k in found else _nothing(trial) for k, trial in enumerate(trials)]
+        return [found[k] if k in found else _nan_channels(trial) for k, trial in enumerate(trials)]
 
     def _case(
         self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record
@@ -167,7 +167,7 @@ class RobotSystem(System):
         except BifaError:
             return None
         inputs: Inputs = sites.corrected_inputs(trial.payload, learnt, plant, place)
-        return RobotInTrial(inputs, _altered(plant, trial, theta, inputs.positive_psi), zeros, theta)
+        return RobotInTrial(inputs, _plant_in_trial(plant, trial, theta, inputs.positive_psi), zeros, theta)
 
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
         return regressors.of(trial, prediction)
@@ -196,9 +196,9 @@ class RobotSystem(System):
     def matters(self, parameter: str, trial: Record) -> bool:
         actuator = trial.payload.actuator
         if parameter in BENCH:
-            return (trial.experiment, actuator) == _FELT[parameter]
+            return (trial.experiment, actuator) == _BENCH_TRIALS[parameter]
         if "_shape_" not in parameter:
-            return parameter in _SEEN_BY[trial.experiment, actuator]
+            return parameter in _DEPENDENCIES[trial.experiment, actuator]
         prefix = parameter.split("_", 1)[0]
         if actuator is not None and prefix != {"large": "body", "small": "small"}[actuator]:
             return False
@@ -293,7 +293,7 @@ def _refuse_dead_machine(dataset: Dataset) -> None:
 
 def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, ...]:
     """Names of the model's parameters that these trials depend on and the data set does not declare as known."""
-    seen = {name for trial in dataset.trials for name in _SEEN_BY[trial.experiment, trial.actuator]}
+    seen = {name for trial in dataset.trials for name in _DEPENDENCIES[trial.experiment, trial.actuator]}
     return tuple(n for n in robot.nominal().parameters if n in seen and n not in dataset.known)
 
 
@@ -307,7 +307,7 @@ def _simulated(cases: Sequence[RobotInTrial[Inputs]], tolerance_m: float, alike:
         return [_simulated([case], tolerance_m, alike)[0] for case in cases]
 
 
-def _nothing(trial: Record) -> Channels:
+def _nan_channels(trial: Record) -> Channels:
     return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
 
 
@@ -329,7 +329,7 @@ def _engine_trial(trial: Trial, measured: bool = True) -> Record:
     )
 
 
-def _altered(plant: Plant, trial: Record, theta: Theta, positive_psi: float | None) -> Plant:
+def _plant_in_trial(plant: Plant, trial: Record, theta: Theta, positive_psi: float | None) -> Plant:
     """`plant` in one trial, with that trial's friction, supply and mass moving on the stand."""
     friction = theta.get("friction_scale", 1.0)
     q = plant.q.copy()

@@ -19,7 +19,7 @@ ANCHORED_MM, FREE_MM = PIPE_MM, 0.72 * PIPE_MM
 _BODY_MM, _END_MM, _WALL_MM = 52.0, 24.0, 4.0
 _MARGIN_MM, _LABEL_MM, _RULER_MM = 16.0, 46.0, 46.0
 _GROUND = '<rect width="100%" height="100%" fill="var(--paper)"/>'
-_SHORT_MM = 640.0  # width up to which lettering has its nominal size; in wider pictures it grows with them
+_NOMINAL_WIDTH_MM = 640.0  # width up to which lettering has its nominal size; in wider pictures it grows with them
 
 
 def animate_walks(
@@ -37,7 +37,7 @@ def animate_walks(
     origin_mm = min(path["tail"].min() for path in paths.values())
     far_mm = max(path["head"].max() for path in paths.values()) - origin_mm + LENGTH_MM
     width = far_mm + 2 * _MARGIN_MM + _END_MM
-    zoom = max(1.0, width / _SHORT_MM)
+    zoom = max(1.0, width / _NOMINAL_WIDTH_MM)
     label_mm, ruler_mm = zoom * _LABEL_MM, zoom * _RULER_MM
     lane_mm = PIPE_MM + 2 * _WALL_MM + label_mm
     height = lane_mm * len(lanes) + 2 * ruler_mm
@@ -66,13 +66,13 @@ def animate_walks(
     rules.append(_keyframes("walk-clock", ends, seconds))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}">'
-        f"<title>{escape(title)}</title><style>{_colors() if standalone else ''}{_look(zoom)}{''.join(rules)}"
+        f"<title>{escape(title)}</title><style>{_colors() if standalone else ''}{_text_style(zoom)}{''.join(rules)}"
         "@media (prefers-reduced-motion: reduce) { [class^=walk] { animation-play-state: paused } }</style>"
         f"{_GROUND if standalone else ''}{''.join(drawn)}</svg>"
     )
 
 
-def _look(zoom: float) -> str:
+def _text_style(zoom: float) -> str:
     return (
         f"svg text {{ font: {13 * zoom:.1f}px system-ui, sans-serif; fill: var(--ink) }} "
         f"@media (max-width: 30rem) {{ svg text {{ font-size: {24 * zoom:.1f}px }} svg .minor {{ display: none }} }}"

@@ -15,8 +15,8 @@ from lacuna.system import Channels, Record
 
 MEASURED = "measured"
 _TITLES = {STATIC: "Static loading", STEP: "Step responses", ANCHOR: "Anchor pulls", WALK: "Walks"}
-_LOOKS = {BASE: ("before", "dashed"), COMPLETED: ("after", "dotted")}
-_MOST = 300  # points of a curve
+_MODEL_STYLES = {BASE: ("before", "dashed"), COMPLETED: ("after", "dotted")}
+_MAX_POINTS = 300  # points of a curve
 
 
 def compared_curves(
@@ -26,7 +26,7 @@ def compared_curves(
 
     predictions: by model (`BASE`, `COMPLETED`), one for each of `trials`. labels: names of the trials, by file.
     """
-    keys = [Key(MEASURED, "measured"), *(Key(model, *_LOOKS[model]) for model in predictions)]
+    keys = [Key(MEASURED, "measured"), *(Key(model, *_MODEL_STYLES[model]) for model in predictions)]
     first = {trial.condition: k for k, trial in reversed(list(enumerate(trials)))}
     found = []
     for experiment, title in _TITLES.items():
@@ -49,10 +49,10 @@ def _column(trial: Record, predictions: Mapping[str, Channels], label: str) -> C
         if channel not in trial.channels:
             continue
         measured = np.asarray(trial.channels[channel])
-        both, off = [Series((MEASURED,), *thinned(x, measured, _MOST), "measured")], []
+        both, off = [Series((MEASURED,), *thinned(x, measured, _MAX_POINTS), "measured")], []
         for model, modeled in ((model, channels[channel]) for model, channels in predictions.items()):
-            both.append(Series((model,), *thinned(x, modeled, _MOST), *_LOOKS[model]))
-            off.append(Series((model,), *thinned(x, measured - modeled, _MOST), _LOOKS[model][0]))
+            both.append(Series((model,), *thinned(x, modeled, _MAX_POINTS), *_MODEL_STYLES[model]))
+            off.append(Series((model,), *thinned(x, measured - modeled, _MAX_POINTS), _MODEL_STYLES[model][0]))
         unit = unit_of(channel)
         panels.append(Panel(both, over, Axis(f"{channel_words(channel).rpartition(' of the ')[2]}, {unit}")))
         panels.append(Panel(off, over, Axis(f"error, {unit}"), height=0.55))

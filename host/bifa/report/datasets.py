@@ -14,7 +14,7 @@ from bifa.report.style import CHAMBERS
 from bifa.report.words import channel_words, unit_of
 
 _MAX_POINTS = 4000  # pixels would show no more; the extremes of each stretch are kept
-_APART = 1.3  # distance between rows of commands
+_ROW_SPACING = 1.3  # distance between rows of commands
 _REPEATS = ("ink", "after", "before", "quiet")
 
 
@@ -49,19 +49,19 @@ def condition_chart(group: Sequence[Trial], condition: str) -> Chart:
                 key = _key(name, trial.repeat, index)
                 keys.setdefault(key.label, key)
                 x, y = thinned(trial.columns[abscissa], trial.columns[name], _MAX_POINTS)
-                lifted, style = (y + _APART * row, "steps") if is_command(name) else (y, "line")
+                lifted, style = (y + _ROW_SPACING * row, "steps") if is_command(name) else (y, "line")
                 series.append(Series((key.label,), x, lifted, key.color, style))
         across = Axis(f"{channel_words(abscissa)}, {unit_of(abscissa)}")
-        panels.append(Panel(series, across, _upward(what, names)))
+        panels.append(Panel(series, across, _y_axis(what, names)))
     title = f"{condition} ({len(group)} {'run' if len(group) == 1 else 'runs'})"
     return Chart([Column(panels)], list(keys.values()), title, title=title, across=1, height=160)
 
 
-def _upward(what: str, names: Sequence[str]) -> Axis:
+def _y_axis(what: str, names: Sequence[str]) -> Axis:
     """Return the y axis: a labelled row for each command, or the unit of any other quantity."""
     if not is_command(names[0]):
         return Axis(f"{what}, {unit_of(names[0])}")
-    return Axis(what, ticks={channel_words(n).rpartition(" ")[2]: 0.5 + _APART * i for i, n in enumerate(names)})
+    return Axis(what, ticks={channel_words(n).rpartition(" ")[2]: 0.5 + _ROW_SPACING * i for i, n in enumerate(names)})
 
 
 def _quantity(name: str) -> str:

@@ -114,7 +114,7 @@ def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any]
         mine, true = found.get(name), (truth or {}).get(name, {})
         for key in dict.fromkeys([*(mine["parameters"] if mine else ()), *true]):
             meaning, unit = effect_parameter(name, key)
-            value, ends = ("not found", "") if mine is None else _sized(mine, key, unit)
+            value, ends = ("not found", "") if mine is None else _value_and_interval(mine, key, unit)
             row = [f"{effect_words(name)}: {meaning}", value, ends]
             rows.append(row + ([quantity(true[key], unit, 3) if key in true else "absent"] if truth else []))
     columns = ["", "found", "90 % interval", *(["sealed value"] if truth is not None else [])]
@@ -131,7 +131,7 @@ def base_table(record: Mapping[str, Any]) -> list[PageTable]:
     return [PageTable(("", "value", "90 % interval", "unit"), rows)] if rows else []
 
 
-def _sized(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
+def _value_and_interval(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
     value, (low, high) = effect["parameters"][key], effect["interval_90"][key]
     ends = "" if low is None or high is None else f"{quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
     return quantity(value, unit, 3), ends

@@ -14,9 +14,9 @@ from bifa.report.page import ChartedSection, Page, PageTable
 from bifa.report.picture import draw_chart
 from bifa.report.words import channel_words, experiment_words, parameter_words, plain, quantity, spoken, unit_of
 
-_CORRELATED = 0.9
-AS_NOISE = 1.1  # errors up to this many times the noise count as noise
-_OF_REPEATS = (
+_MIN_CORRELATION = 0.9
+MAX_NOISE_RATIO = 1.1  # errors up to this many times the noise count as noise
+_REPEATS_NOTE = (
     "Here it includes all that differs from run to run, even what an effect would explain (such as a ripple with "
     "another phase in every run); a diagnosis takes that out of it, so that its ratios are larger."
 )
@@ -28,7 +28,7 @@ def fit_page(found: Identification) -> Page:
     worst = max(found.error.values())
     says = (
         "The base model describes these data to within its noise."
-        if worst <= AS_NOISE
+        if worst <= MAX_NOISE_RATIO
         else f"The base model does not describe this data: in the worst case its error is {worst:.1f} times "
         "the noise floor."
     )
@@ -37,7 +37,7 @@ def fit_page(found: Identification) -> Page:
         f"Fit of {dataset.name}",
         f"{says} {fitted_to}",
         [*parameters_and_remarks(found), *curves(found)],
-        (f"{BASE_MODEL} {RMS} {NOISE_FLOOR} {_OF_REPEATS}",),
+        (f"{BASE_MODEL} {RMS} {NOISE_FLOOR} {_REPEATS_NOTE}",),
         (errors_table(found),),
     )
 
@@ -76,7 +76,7 @@ def remarks(found: Identification) -> list[str]:
             f"+-{abs(static.hysteresis_N):.2f} N, static residual {curve.residual_N:.2f} N RMS."
         )
     named = set(found.system.fitted)
-    for first, second, r in found.uncertainty.correlations(_CORRELATED):
+    for first, second, r in found.uncertainty.correlations(_MIN_CORRELATION):
         if first in named and second in named:
             lines.append(f"{first} and {second} are strongly correlated ({r:+.2f}).")
     needs: dict[str, list[str]] = {}
@@ -85,7 +85,7 @@ def remarks(found: Identification) -> list[str]:
     for experiment, names in needs.items():
         lines.append(f"Not determined by this data: {', '.join(names)}. What would determine it: {experiment}.")
     (experiment, channel), worst = max(found.error.items(), key=lambda item: item[1])
-    if worst > AS_NOISE:
+    if worst > MAX_NOISE_RATIO:
         lines.append(
             f"The model does not describe this data: its error is {worst:.1f} times the noise in {channel} of "
             f"{experiment}. The intervals do not allow for that; `bifa diagnose` looks for what the model lacks."

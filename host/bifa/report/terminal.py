@@ -12,8 +12,8 @@ from bifa.report.page import ChartedSection, PageTable
 from bifa.report.words import NBSP
 from bifa.screen import Console
 
-_BETWEEN = 3  # spaces between columns
-_NARROWEST = 8  # characters to which the heading of a numeric column may be wrapped
+_COLUMN_GAP = 3  # spaces between columns
+_MIN_HEADING_WIDTH = 8  # characters to which the heading of a numeric column may be wrapped
 
 
 def print_table(console: Console, content: PageTable) -> None:
@@ -23,12 +23,12 @@ def print_table(console: Console, content: PageTable) -> None:
     )
     cells = [[row[i] for row in content.rows] for i in range(len(content.columns))]
     widths = [max(map(len, [heading, *column])) for heading, column in zip(content.columns, cells, strict=True)]
-    is_wide = sum(widths) + _BETWEEN * (len(widths) - 1) > console.width
+    is_wide = sum(widths) + _COLUMN_GAP * (len(widths) - 1) > console.width
     for i, heading in enumerate(content.columns):
         if not i or (content.words and i == len(content.columns) - 1):
             table.add_column(heading)
         else:  # wrap the headings of numeric columns before the row labels
-            most = max(_NARROWEST, *map(len, [*heading.split(), *cells[i]])) if is_wide else None
+            most = max(_MIN_HEADING_WIDTH, *map(len, [*heading.split(), *cells[i]])) if is_wide else None
             table.add_column(heading, justify="right", max_width=most)
     for row in content.rows:
         table.add_row(*(plain_spaces(cell) for cell in row))

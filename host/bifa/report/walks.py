@@ -17,7 +17,7 @@ MEASURED, SIMULATED = "measured", "simulated"
 _ROLES = {BASE: "before", COMPLETED: "after"}  # everything else is drawn in ink
 _ROW, _BAR = 1.2, 0.9
 _LINES = ("line", "dashed", "dotted")
-_MM = 60.0  # the path's axis ends at a multiple of this
+_PATH_STEP_MM = 60.0  # the path's axis ends at a multiple of this
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Walk:
 def walks_chart(walks: Sequence[Walk]) -> Chart:
     """Plot all walks over equal times (that of the shortest record) and distances, so that faster ones look faster."""
     horizon_s = min(float(walk.first["time_s"][-1]) for walk in walks)
-    furthest = max(float(_until(walk.first, "displacement_head_mm", horizon_s)[1].max()) for walk in walks)
-    reach = (-0.05 * furthest, float(np.ceil(1.02 * furthest / _MM) * _MM))
+    furthest = max(float(_truncate(walk.first, "displacement_head_mm", horizon_s)[1].max()) for walk in walks)
+    reach = (-0.05 * furthest, float(np.ceil(1.02 * furthest / _PATH_STEP_MM) * _PATH_STEP_MM))
     names = list(dict.fromkeys(name for walk in walks for name in walk.records))
     keys = [Key(chamber, chamber, "area") for chamber in CHAMBERS]
     lines = dict(zip(names, _LINES, strict=False))
@@ -69,16 +69,21 @@ def _column(
     outputs = [
         Series((chamber, first), x, row * _ROW + _BAR * np.nan_to_num(y), chamber, "area", base=row * _ROW)
         for row, chamber in enumerate(CHAMBERS)
-        for x, y in [edges(*_until(walk.first, f"command_{chamber}", horizon_s))]
+        for x, y in [edges(*_truncate(walk.first, f"command_{chamber}", horizon_s))]
     ]
     pressures = [
-        Series((chamber, name), *thinned(*_until(record, f"pressure_{chamber}_psi", horizon_s)), chamber, lines[name])
+        Series(
+            (chamber, name), *thinned(*_truncate(record, f"pressure_{chamber}_psi", horizon_s)), chamber, lines[name]
+        )
         for name, record in walk.records.items()
         for chamber in CHAMBERS
     ]
     paths = [
         Series(
-            (name,), *thinned(*_until(record, "displacement_head_mm", horizon_s)), _ROLES.get(name, "ink"), lines[name]
+            (name,),
+            *thinned(*_truncate(record, "displacement_head_mm", horizon_s)),
+            _ROLES.get(name, "ink"),
+            lines[name],
         )
         for name, record in walk.records.items()
     ]
@@ -91,6 +96,6 @@ def _column(
     return Column(panels, walk.title)
 
 
-def _until(record: Mapping[str, np.ndarray], column: str, horizon_s: float) -> tuple[np.ndarray, np.ndarray]:
+def _truncate(record: Mapping[str, np.ndarray], column: str, horizon_s: float) -> tuple[np.ndarray, np.ndarray]:
     shown = record["time_s"] <= horizon_s
     return record["time_s"][shown], np.asarray(record[column])[shown]

@@ -122,7 +122,7 @@ def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
     if labels:
         text = _FILE.sub(lambda found: labels.get(found[0], found[0]), text)
     text = (
-        _IDENTIFIER.sub(lambda found: _said(found[0]), text)
+        _IDENTIFIER.sub(lambda found: _identifier_words(found[0]), text)
         .replace("locomotion", "walking")
         .replace(" x the ", " × the ")
         .replace("+-", "±")
@@ -130,7 +130,7 @@ def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _said(name: str) -> str:
+def _identifier_words(name: str) -> str:
     if name in BASE_PARAMETERS or name in library():
         return parameter_words(name)
     return channel_words(name)

@@ -31,7 +31,7 @@ VACUUM, POSITIVE, OFF = 0, 1, 2
 
 _WALL_COUNT = 3.0  # eq. (7): three actuators per segment
 _LEAST_GROWTH = 0.05  # share of the damping below which a step is too long for the falling part of K
-_ALIKE = 1e-9  # relative difference below which two holding forces count as equal
+_ALIKE = 1e-9  # difference in excess over the hold, relative to both holds, below which two ends count as equal
 TOO_LONG = -1
 
 
@@ -310,9 +310,9 @@ def _ends(plant, rig, gravity, tension, growth, y, y_new, h):
 
 @merged
 def _first_to_start(plant, rig, normal_h, normal_t, push_h, push_t, y):
-    """Directions in which two resting ends start to slide if friction gives way at both in the same step. If the
-    holding forces differ, the weaker end starts alone, since the damper then unloads the other; if they are equal (both
-    ends free, equal halves), both start together."""
+    """Directions in which two resting ends start to slide if friction gives way at both in the same step. If one push
+    exceeds its hold by more, that end starts alone, since the damper then unloads the other; if the excesses are equal
+    (both ends free, equal halves), both start together."""
     side_h, side_t = _sign(push_h), _sign(push_t)
     hold_h = _limit(plant, rig, 0, normal_h, side_h, 0.0, y)
     hold_t = _limit(plant, rig, 1, normal_t, side_t, 0.0, y)

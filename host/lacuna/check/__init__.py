@@ -6,7 +6,7 @@ from lacuna.check.clocks import coarse_clocks, other_clocks
 from lacuna.check.measured import check_columns, check_constant, check_record, gaps_in_inputs
 from lacuna.check.model import check_model
 from lacuna.check.names import check_names
-from lacuna.check.repeats import apart_for_no_reason, check_inputs, check_times, not_declared, odd_ones
+from lacuna.check.repeats import check_inputs, check_times, not_declared, odd_ones, unexplained_differences
 from lacuna.system import System
 
 
@@ -22,6 +22,6 @@ def check(system: System) -> tuple[str, ...]:
     check_times(trials)
     predictions, said = check_model(system, trials)
     ignored = check_inputs(system, trials, predictions)
-    odd = tuple(odd_ones(trials)) or tuple(apart_for_no_reason(system, trials))
+    odd = tuple(odd_ones(trials)) or tuple(unexplained_differences(system, trials))
     clocks = (*other_clocks(trials), *coarse_clocks(system, trials))
     return (*odd, *not_declared(trials), *clocks, *gaps_in_inputs(trials), *ignored, *said)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from lacuna.check.model import initial, sought
+from lacuna.check.model import initial, predict_unchecked
 from lacuna.check.numbers import differ
 from lacuna.system import Channels, Parameter, Record, System, Theta
 
-_SMALL = 0.02  # of a parameter's scale: a derivative's step; if it changes nothing, the parameter acts in larger ones
+_REL_STEP = 0.02  # of a parameter's scale: derivative step; if it changes nothing, the parameter acts in larger ones
 _DOUBLED, _HALVED = 10, 14  # number of doublings and bisections of the interval when locating an edge between steps
 
 Predict = Callable[[float], Channels]
@@ -31,12 +31,12 @@ def _width(
     system: System, theta: Theta, name: str, parameter: Parameter, effects: tuple[str, ...], trials: Sequence[Record]
 ) -> float:
     """Distance between adjacent edges, in the first trial that has two; 0 if small changes affect a prediction."""
-    small = _SMALL * parameter.step_scale
+    small = _REL_STEP * parameter.step_scale
     small = small if parameter.value + 2.0**_DOUBLED * small <= parameter.upper else -small
     for trial in trials:
 
         def predict(value: float, trial: Record = trial) -> Channels:
-            return sought(system, {**theta, name: value}, effects, trial)
+            return predict_unchecked(system, {**theta, name: value}, effects, trial)
 
         # An initial value that is a whole number of samples may lie right before an edge.
         first, second, third = (predict(parameter.value + k * small) for k in range(3))

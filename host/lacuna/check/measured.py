@@ -8,7 +8,7 @@ import numpy as np
 
 from lacuna.check.numbers import SAME, first, spread
 from lacuna.errors import MisuseError
-from lacuna.records import falling
+from lacuna.records import describe_reversal
 from lacuna.system import Record, by_channel
 
 _FEWEST_SAMPLES = 8
@@ -20,7 +20,7 @@ def check_record(trial: Record) -> None:
         raise MisuseError(f"trial {trial.name}: its times are not a sequence of at least {_FEWEST_SAMPLES} numbers.")
     if not np.isfinite(time).all():
         raise MisuseError(f"trial {trial.name}: time at sample {first(~np.isfinite(time))} is not a number.")
-    if said := falling(time):
+    if said := describe_reversal(time):
         raise MisuseError(f"trial {trial.name}: {said}.")
     if not trial.channels:
         raise MisuseError(f"trial {trial.name} has no channel to compare a prediction with.")

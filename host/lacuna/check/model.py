@@ -12,8 +12,8 @@ from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.records import Stretch
 from lacuna.system import Channels, Record, System, Theta
 
-_NEUTRAL = 1e-3  # of a channel's spread, RMS: largest permitted change by an effect at its absent size
-_ELSEWHERE = 0.03  # the same for an effect of typical size in an experiment outside its `experiments`
+_MAX_CHANGE = 1e-3  # of a channel's spread, RMS: largest permitted change by an effect at its absent size
+_MAX_CHANGE_ELSEWHERE = 0.03  # the same for an effect of typical size in an experiment outside its `experiments`
 _NEAR_ABSENT = 0.1  # of its typical size: an effect's bounds must let it come this close to its absent size
 
 
@@ -124,9 +124,9 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
         off = effect.typical | dict.fromkeys(effect.size_names, effect.absent)
         for trial in firsts.values():
             if effect.shows_in(trial):
-                theta, share, why = off, _NEUTRAL, f"its size is {effect.absent:g}, at which it is declared absent."
+                theta, share, why = off, _MAX_CHANGE, f"its size is {effect.absent:g}, at which it is declared absent."
             else:
-                theta, share = effect.typical, _ELSEWHERE
+                theta, share = effect.typical, _MAX_CHANGE_ELSEWHERE
                 why = f"{trial.experiment} is not among its `experiments`: add it."
             found = predicted(system, dict(start) | theta, (name,), trial)
             if channel := changed(found, predictions[trial.name], trial, share):
@@ -166,7 +166,9 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
         ]
         seen = (t for t in trials if effect.shows_in(t))
         if not any(
-            changed(sought(system, dict(start) | effect.typical | size, (name,), t), predictions[t.name], t, 0.0)
+            changed(
+                predict_unchecked(system, dict(start) | effect.typical | size, (name,), t), predictions[t.name], t, 0.0
+            )
             for t in seen
             for size in sizes
         ):
@@ -177,7 +179,7 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
     return found
 
 
-def sought(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
+def predict_unchecked(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
     """An unchecked prediction, as the search makes it, for parameters that may be far from the initial ones; a failed
     one (NaN) counts as a change."""
     theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}

@@ -14,10 +14,10 @@ from lacuna.check.numbers import SAME, changed, fast_noise, spread
 from lacuna.errors import MisuseError, listed
 from lacuna.system import Channels, Record, System, by_channel, groups_of_repeats
 
-_OTHER = 0.5  # of an input's spread: inputs of repeats must differ by less, RMS
-_GOOD_PART = 0.25  # of a channel's spread: RMS difference between repeats that is suspicious,
-_FAR_MORE = 20.0  # if it is also this many times their own fast noise
-_UNLIKE = 10.0  # times the usual RMS difference between repeats: a repeat this far from all others is suspect
+_MAX_INPUT_DIFFERENCE = 0.5  # of spread: RMS limit for inputs of repeats, or for predictions if single values
+_MIN_DIFFERENCE = 0.25  # of a channel's spread: RMS difference between repeats that is suspicious,
+_MIN_NOISE_RATIO = 20.0  # if it is also this many times their own fast noise
+_OUTLIER_RATIO = 10.0  # times the usual RMS difference between repeats: a repeat this far from all others is suspect
 
 
 def check_times(trials: Sequence[Record]) -> None:
@@ -33,13 +33,13 @@ def check_times(trials: Sequence[Record]) -> None:
 
 
 def check_inputs(system: System, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> Iterator[str]:
-    """Raise MisuseError if the inputs of repeats differ in a way that changes the prediction; warn of input columns
-    that differ without doing so. `predictions`: at the initial values, of the trials that can be predicted."""
+    """Raise MisuseError if the inputs of repeats differ much (`_OTHER`) and change the prediction; warn of columns that
+    differ without doing so. `predictions`: at the initial values, of the trials that can be predicted."""
     ignored: dict[str, str] = {}
     for first, other, name, its, said in _differences([t for t in trials if t.name in predictions]):
         there = replace(first, inputs={**first.inputs, name: its})
         of_column = np.ndim(its) > 0
-        found, share = predicted(system, initial(system), (), there), SAME if of_column else _OTHER
+        found, share = predicted(system, initial(system), (), there), SAME if of_column else _MAX_INPUT_DIFFERENCE
         if channel := changed(found, predictions[first.name], first, share):
             raise MisuseError(
                 f"{_declared(first, other)}, but {said}, which changes the prediction of {channel}: the difference"
@@ -84,7 +84,7 @@ def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
             yield from _unlike(group, channel, differences, float(np.median(elsewhere)) if elsewhere else 0.0)
 
 
-def apart_for_no_reason(system: System, trials: Sequence[Record]) -> Iterator[str]:
+def unexplained_differences(system: System, trials: Sequence[Record]) -> Iterator[str]:
     """Warn of the worst group of repeats that differ by much of their range and far more than their own noise although
     nothing is declared to vary from run to run. A setting that only their names tell may be the cause."""
     found = []
@@ -95,7 +95,7 @@ def apart_for_no_reason(system: System, trials: Sequence[Record]) -> Iterator[st
             between = float(np.median(_pairs(_apart(group, channel))))
             within = float(np.median([fast_noise(trial.time_s, trial.channels[channel]) for trial in group]))
             size = max(spread(trial.channels[channel]) for trial in group)
-            if between > max(_GOOD_PART * size, _FAR_MORE * within):
+            if between > max(_MIN_DIFFERENCE * size, _MIN_NOISE_RATIO * within):
                 found.append((between / size, between, within, channel, group))
     if found:
         _, between, within, channel, group = max(found, key=lambda one: one[0])
@@ -125,7 +125,7 @@ def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, usual: flo
     """Warn of members of a group unlike the others. `apart`: RMS differences between members, shape (n, n); `usual`:
     the typical difference in the experiment's other conditions, 0 if there are none."""
     if len(group) == 2:
-        if apart[0, 1] > _UNLIKE * usual > 0.0:
+        if apart[0, 1] > _OUTLIER_RATIO * usual > 0.0:
             yield (
                 f"Trials {group[0].name} and {group[1].name}, repeats of one condition, differ in {channel} by"
                 f" {apart[0, 1]:.3g} (RMS), other pairs by {usual:.2g}: if one was recorded differently, leave it out."
@@ -134,7 +134,7 @@ def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, usual: flo
     for k, trial in enumerate(group):
         others = [j for j in range(len(group)) if j != k]
         nearest, alike = apart[k, others].min(), float(np.median(_pairs(apart[np.ix_(others, others)])))
-        if nearest > _UNLIKE * max(alike, usual) > 0.0:
+        if nearest > _OUTLIER_RATIO * max(alike, usual) > 0.0:
             times_s, differs = _difference(trial, group[others[0]], channel)
             at = trial.time_s[0] + times_s[np.nanargmax(np.abs(differs))]
             yield (
@@ -181,7 +181,7 @@ def _column_changed(first: Record, other: Record, name: str, spread_of_all: floa
     if spread_of_all == 0.0 or not (_is_sampled(first, name) and _is_sampled(other, name)):
         return False
     apart = np.asarray(first.inputs[name]) - _at_times_of(first, other, name)
-    return bool(np.sqrt(np.nanmean(apart**2)) > _OTHER * spread_of_all)
+    return bool(np.sqrt(np.nanmean(apart**2)) > _MAX_INPUT_DIFFERENCE * spread_of_all)
 
 
 def _at_times_of(first: Record, other: Record, name: str) -> np.ndarray:

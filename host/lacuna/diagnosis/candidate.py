@@ -64,8 +64,8 @@ class Candidate:
 
     @cached_property
     def checked_error(self) -> tuple[int, float]:
-        """On the trials that it was not fitted to: how many it cannot predict at all, and the RMS residual of the
-        others, without compression of large residuals."""
+        """On the trials that it was not fitted to: how many it cannot predict in full, and the RMS of all residuals
+        that exist, without compression of large ones."""
         return at_full_size(self.judged)
 
     @cached_property

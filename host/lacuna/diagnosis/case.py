@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from lacuna.diagnosis.candidate import Candidate, judge, sharpened_floor
 from lacuna.diagnosis.nuisances import Followed, by_condition, find_followed, met_by_chance
 from lacuna.diagnosis.policy import Policy
-from lacuna.diagnosis.race import continued, helps_at_once
+from lacuna.diagnosis.race import add_each_effect, helps_without_refit
 from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import (
     at_full_size,
@@ -24,17 +24,17 @@ from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import (
     Fit,
-    at_its_misfit,
+    continue_search,
     converged,
     evaluate_on,
     fit,
     predictive,
+    refit_at_misfit,
     refit_on,
-    released,
-    renewed,
+    relax_priors,
     spread_starts,
 )
-from lacuna.estimation.noise import LOWER, SHARPENED, NoiseFloor, estimate_noise
+from lacuna.estimation.noise import MAX_REESTIMATES, REFIT_SHARE, NoiseFloor, estimate_noise
 from lacuna.estimation.settle import settle
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
@@ -42,23 +42,23 @@ from lacuna.estimation.uncertainty import intervals
 from lacuna.system import System
 
 _ROUGH, _FINE = 1e-3, 1e-4  # relative to the cost: tolerances of an intermediate fit and of a reported one
-_HOPELESS = 5.0  # times the relevance threshold: no refit to a few more trials brings a larger remainder below it,
-_DOUBTFUL = 1.5  # and no iterations from a nearly converged fit bring down one beyond this
-_ASTRAY = 1.1  # ratio of errors on conditions never fitted beyond which plain least squares is rejected
+_MAX_TO_REFIT = 5.0  # times the relevance threshold: no refit to a few more trials brings a larger remainder below it,
+_MAX_TO_CONVERGE = 1.5  # and no iterations from a nearly converged fit bring down one beyond this
+_MAX_ERROR_RATIO = 1.1  # ratio of errors on conditions never fitted beyond which plain least squares is rejected
 _FITS = ("on_known", "settled", "intervals", "converged")  # methods whose results do not depend on the policy
 
 Answer = TypeVar("Answer")
 
 
-def _once(ask: Callable[[Case, Candidate], Answer]) -> Callable[[Case, Candidate], Answer]:
+def _cached(ask: Callable[[Case, Candidate], Answer]) -> Callable[[Case, Candidate], Answer]:
     """Cache a method's result for each candidate."""
 
     @wraps(ask)
     def answered(self: Case, candidate: Candidate) -> Answer:
-        asked = (ask.__name__, candidate)
-        if asked not in self._answers:
-            self._answers[asked] = ask(self, candidate)
-        answer: Answer = self._answers[asked]
+        key = (ask.__name__, candidate)
+        if key not in self._answers:
+            self._answers[key] = ask(self, candidate)
+        answer: Answer = self._answers[key]
         return answer
 
     return answered
@@ -69,13 +69,13 @@ class Case:
 
     def __init__(self, system: System, split: Split, policy: Policy, seed: int, suspected: Collection[str] = ()):
         self.system, self.split, self.policy, self.seed, self.suspected = system, split, policy, seed, suspected
-        self.by_turns: dict[Candidate, Candidate] = {}  # without repeats: each candidate's cross-validated form
+        self.cross_validated: dict[Candidate, Candidate] = {}  # without repeats: each candidate's cross-validated form
         self._answers: dict[tuple[str, Candidate], Any] = {}
 
-    def ruled_by(self, policy: Policy) -> Case:
+    def with_policy(self, policy: Policy) -> Case:
         """The same case under another policy: fits are kept, decisions are recomputed."""
         other = Case(self.system, self.split, policy, self.seed, self.suspected)
-        other._answers = {asked: found for asked, found in self._answers.items() if asked[0] in _FITS}
+        other._answers = {key: found for key, found in self._answers.items() if key[0] in _FITS}
         return other
 
     def fit_base(self, starts: int) -> Fit:
@@ -93,9 +93,9 @@ class Case:
         """The same explanation fitted to convergence against another floor."""
         problem = fitted.problem.over(self.split.fit, floor)
         solution = solve(problem, fitted.solution.point, relative=_FINE)
-        return Fit(problem, renewed(problem, solution, relative=_FINE), fitted.starts, fitted.starts_agreeing)
+        return Fit(problem, continue_search(problem, solution, relative=_FINE), fitted.starts, fitted.starts_agreeing)
 
-    def sharply(self, candidate: Candidate) -> Candidate:
+    def sharpen(self, candidate: Candidate) -> Candidate:
         """Refit against the floor that the explanation's own residuals show, as long as the floor falls and the
         explanation suffices. Nuisances such as a run's initial state may scatter by more than the noise. The first
         floor, estimated with nuisances at their expected values, contains all of that scatter and the next one still
@@ -103,10 +103,10 @@ class Case:
         belongs in the floor, since a run has to be predicted without knowing its factors (`predictive`)."""
         if any(p.factor_of for parameters in candidate.fitted.problem.nuisances for p in parameters):
             return candidate
-        for _ in range(SHARPENED):
+        for _ in range(MAX_REESTIMATES):
             floor = candidate.fitted.problem.floor
             lower = sharpened_floor(candidate, self.split, floor)
-            if not self.suffices(candidate) or lower.share_of(floor) >= LOWER:
+            if not self.suffices(candidate) or lower.share_of(floor) >= REFIT_SHARE:
                 break
             candidate = self.judge(self._again(candidate.fitted, lower), near=candidate.checked)
         return candidate
@@ -114,13 +114,13 @@ class Case:
     def judge(self, fitted: Fit, near: Fit | None = None) -> Candidate:
         return judge(fitted, self.split, self.policy, near=near)
 
-    @_once
+    @_cached
     def on_known(self, candidate: Candidate) -> Fit:
         """The explanation fitted to all known trials, with the same effort for every explanation."""
         near = (candidate.fitted, candidate.checked)
         return refit_on(candidate.fitted, self.split.known, near=near, relative=_FINE)
 
-    @_once
+    @_cached
     def settled(self, candidate: Candidate) -> Fit:
         """The explanation at its optimum, with fresh derivatives: the basis of the reported parameters and their
         uncertainties. If the system sets `tells_of_all`, it is fitted to every trial: once judging is over, the trials
@@ -129,31 +129,31 @@ class Case:
         if self.system.tells_of_all and others:
             near = (fitted, evaluate_on(fitted, others))
             fitted = refit_on(fitted, (*fitted.problem.trials, *others), near=near, relative=_FINE)
-        return settle(at_its_misfit(released(fitted)))
+        return settle(refit_at_misfit(relax_priors(fitted)))
 
-    @_once
+    @_cached
     def intervals(self, candidate: Candidate) -> dict[str, tuple[float, float]]:
         """90 % interval of every parameter of the explanation, from all known trials."""
         return intervals(self.settled(candidate))
 
-    @_once
+    @_cached
     def converged(self, candidate: Candidate) -> Fit:
         """The explanation followed to convergence by plain least squares: the basis of the verdict. If a few large
         residuals mislead plain least squares, so that never-fitted conditions are predicted worse, the fit before it is
         returned."""
         fitted = self.on_known(candidate)
         ended = converged(fitted)
-        return fitted if self._astray(ended, fitted) else ended
+        return fitted if self._is_misled(ended, fitted) else ended
 
-    def _astray(self, ended: Fit, before: Fit) -> bool:
+    def _is_misled(self, ended: Fit, before: Fit) -> bool:
         if not self.split.unseen:
             return False
         (lost, error), (lost_before, error_before) = (
             at_full_size([evaluate_on(fitted, self.split.unseen)]) for fitted in (ended, before)
         )
-        return lost > lost_before or error > _ASTRAY * error_before
+        return lost > lost_before or error > _MAX_ERROR_RATIO * error_before
 
-    @_once
+    @_cached
     def remainder_of(self, candidate: Candidate) -> Remainder:
         """The remainder of an explanation converged by plain least squares: the basis of the verdict."""
         return self.remainder(self.converged(candidate))
@@ -164,17 +164,17 @@ class Case:
         others = [t for t in self.split.known + self.split.unseen if t.name not in names]
         return self._tested(fitted, evaluate_on(fitted, others))
 
-    @_once
+    @_cached
     def suffices(self, candidate: Candidate) -> bool:
         """Whether an explanation, fitted to all known trials, leaves nothing that matters."""
         return (
             self.nearly(candidate)
-            and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
+            and self.remainder(self.on_known(candidate)).worst < _MAX_TO_CONVERGE
             and not self.remainder_of(candidate).matters
             and not self.hidden(candidate)
         )
 
-    @_once
+    @_cached
     def hidden(self, candidate: Candidate) -> str | None:
         """An effect that removes something that matters although repeats need not share it, so that it hides in the
         floor: either an effect with values of its own in every trial, or one that the parameters disable
@@ -186,15 +186,15 @@ class Case:
             name
             for name, effect in library.items()
             if name not in candidate.effects
-            and (effect.apart or (effect.own and helps_at_once(parent, name, self.policy.gain)))
+            and (effect.apart or (effect.own and helps_without_refit(parent, name, self.policy.gain)))
         ]
-        for effect, fitted in zip(able, continued(parent, able, workers), strict=True):
+        for effect, fitted in zip(able, add_each_effect(parent, able, workers), strict=True):
             other = judge(fitted, self.split, self.policy, near=candidate.checked)
             if candidate.cost - other.cost > self.policy.gain and self.exceeds(candidate, other):
                 return effect
         return None
 
-    @_once
+    @_cached
     def followed(self, candidate: Candidate) -> tuple[Followed, ...]:
         """Nuisances that still follow the condition under an explanation, which independent draws for each run do not.
         Empty unless the system declares that nuisances are drawn for each run."""
@@ -215,7 +215,7 @@ class Case:
         known = self.converged(candidate)
         return [known, evaluate_on(known, self.split.unseen)]
 
-    def dominated(self, candidate: Candidate, better: Candidate) -> bool:
+    def is_dominated(self, candidate: Candidate, better: Candidate) -> bool:
         """Whether an explanation leaves relevantly more than one that is better beyond doubt. Needed because repeats of
         a walk that fails through friction differ so much that what they share may pass for chance."""
         mine, others = self.converged(candidate), self.converged(better)
@@ -225,7 +225,7 @@ class Case:
         return self.exceeds_on_all(*both)
 
     def exceeds(self, candidate: Candidate, better: Candidate) -> bool:
-        """Like `dominated`, but for the candidates without a refit, on the trials that they are judged on."""
+        """Like `is_dominated`, but for the candidates without a refit, on the trials that they are judged on."""
         return self.exceeds_on_all(([candidate.fitted], [better.fitted]), (candidate.judged, better.judged))
 
     def exceeds_on_all(self, *both: tuple[Sequence[Fit], Sequence[Fit]]) -> bool:
@@ -237,10 +237,10 @@ class Case:
         ahead = (excess_over(mine, others, self.system.accuracy) for mine, others in unseen)
         return max(known) > self.policy.relevance or min(ahead) > self.policy.relevance
 
-    @_once
+    @_cached
     def nearly(self, candidate: Candidate) -> bool:
         """Whether an explanation leaves so little that a fit from another start might leave nothing that matters."""
-        return self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
+        return self._tested(candidate.fitted, candidate.checked).worst < _MAX_TO_REFIT
 
     def may_be_lost(self, candidate: Candidate) -> bool:
         """Whether what an explanation leaves may be due to a local optimum of its fit."""
@@ -249,8 +249,8 @@ class Case:
     def closed(self, candidate: Candidate, base: Candidate) -> float:
         """The share of the base model's gap that an explanation closes on the trials that judge it and that it was not
         fitted to."""
-        if base in self.by_turns and candidate in self.by_turns:
-            base, candidate = self.by_turns[base], self.by_turns[candidate]
+        if base in self.cross_validated and candidate in self.cross_validated:
+            base, candidate = self.cross_validated[base], self.cross_validated[candidate]
         scaled = by_trial([candidate.fitted, candidate.checked])
         pairs = repeat_differences(self.split.fit, self.split.judging, scaled)[1]
         floor = rms(pairs) if pairs else 1.0

@@ -47,7 +47,7 @@ def is_due(case: Case) -> bool:
 
 def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
     """Cross-validate the leading explanations of `found` and their subsets on every known record. The case maps the
-    original candidates to these (`Case.by_turns`)."""
+    original candidates to these (`Case.cross_validated`)."""
     least = min(c.cost for c in found.tried)
     near = [c for c in found.tried if c is not found.base and c.cost < case.policy.reach * least]
     near.sort(key=lambda c: c.cost)
@@ -60,7 +60,7 @@ def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
     jobs = [(fit, fold) for fit in known for fold in folds]
     names = [c.effects for c in candidates for _ in folds]
     left_out = workers.map("predicting each record in turn with", names, _left_out, jobs)
-    judged = case.by_turns
+    judged = case.cross_validated
     for k, (candidate, fit) in enumerate(zip(candidates, known, strict=True)):
         mine = left_out[k * len(folds) : (k + 1) * len(folds)]
         unseen = evaluate_on(fit, case.split.unseen)

@@ -21,7 +21,7 @@ from lacuna.system import groups_of_repeats
 
 _DRAWS = 1000  # bootstrap draws over conditions
 _COMPARED = 16  # largest number of further explanations to compare, best first
-_FEWEST = 3  # conditions needed to estimate the variation between conditions; with fewer, trials are resampled
+_MIN_CONDITIONS = 3  # conditions needed to estimate the variation between conditions; with fewer, trials are resampled
 
 Judgement = Callable[[Candidate, Candidate], bool]
 
@@ -66,10 +66,12 @@ def choose(search: Search, policy: Policy, matters: Judgement) -> Choice:
     against = Comparison(search, policy, matters)
     everything = sorted((*search.tried, *search.freed), key=lambda c: c.cost)
     best = everything[0]
-    held = [c for c in search.tried if not any(against.dominated(c, other) for other in everything)]
+    held = [c for c in search.tried if not any(against.is_dominated(c, other) for other in everything)]
     held.sort(key=lambda c: (len(c.effects), against.form(c).cost))
     weights = _weights(_compared(search, best), against.dispersion)
-    chosen = next((c for c in held if not against.surely(c, best) or _supported(c, weights, policy)), None)
+    chosen = next(
+        (c for c in held if not against.is_significantly_worse(c, best) or _supported(c, weights, policy)), None
+    )
     chosen = chosen or (held[0] if held else best)
     while (smaller := _without_one(chosen, search, against)) is not None:
         chosen = smaller
@@ -82,10 +84,10 @@ def _supported(candidate: Candidate, weights: dict[tuple[str, ...], float], poli
     if candidate.effects not in weights:
         return False
     rivals = _rivals(candidate.effects, weights, policy)
-    return min(_behind(e, weights, rivals) for e in candidate.effects) >= policy.supported
+    return min(_total_weight(e, weights, rivals) for e in candidate.effects) >= policy.supported
 
 
-def _behind(effect: str, weights: dict[tuple[str, ...], float], rivals: Sequence[tuple[str, ...]]) -> float:
+def _total_weight(effect: str, weights: dict[tuple[str, ...], float], rivals: Sequence[tuple[str, ...]]) -> float:
     """The total weight of the sets that contain this effect, or another in its place."""
     return sum(w for effects, w in weights.items() if effect in effects or effects in rivals)
 
@@ -94,7 +96,7 @@ def _without_one(chosen: Candidate, search: Search, against: Comparison) -> Cand
     """`chosen` without an effect that it does not need to predict as well; None if it needs all."""
     for effect in chosen.effects:
         smaller = search.with_effects([e for e in chosen.effects if e != effect])
-        if smaller is not None and not against.dominated(smaller, against.form(chosen)):
+        if smaller is not None and not against.is_dominated(smaller, against.form(chosen)):
             return smaller
     return None
 
@@ -107,7 +109,7 @@ class Comparison:
     policy: Policy
     matters: Judgement
 
-    def dominated(self, candidate: Candidate, better: Candidate) -> bool:
+    def is_dominated(self, candidate: Candidate, better: Candidate) -> bool:
         """Whether an explanation predicts worse than `better` in each of its forms (as in the library, and freed)."""
         forms = {candidate, self.form(candidate)}
         return better not in forms and all(self.worse(form, better) for form in forms)
@@ -118,9 +120,9 @@ class Comparison:
     def worse(self, one: Candidate, other: Candidate) -> bool:
         """Whether `one` predicts worse than `other`: beyond doubt, by a margin that matters, and by more than a wrong
         functional form of an effect already included would account for."""
-        return self.surely(one, other) and self._by_much(one, other) and self.matters(one, other)
+        return self.is_significantly_worse(one, other) and self._is_much_worse(one, other) and self.matters(one, other)
 
-    def surely(self, one: Candidate, other: Candidate) -> bool:
+    def is_significantly_worse(self, one: Candidate, other: Candidate) -> bool:
         """Whether `other` is better by more than noise and remaining misfit can explain, on trials that it was not
         fitted to as well, and robustly to the choice of conditions measured."""
         least = self.policy.gain * _extra(one, other)
@@ -130,10 +132,10 @@ class Comparison:
             gain > least
             and unseen > self.policy.unseen_gain * least
             and other.checked_error < one.checked_error
-            and _by_chance(one, other) < self.policy.doubt
+            and _chance_probability(one, other) < self.policy.doubt
         )
 
-    def _by_much(self, one: Candidate, other: Candidate) -> bool:
+    def _is_much_worse(self, one: Candidate, other: Candidate) -> bool:
         """Whether each additional effect closes the required share of what is left, and also either the required share
         of the gap or half of what is left. By mean squares on trials not fitted, without compression of large
         residuals."""
@@ -175,7 +177,7 @@ def dispersion_of(tried: Sequence[Candidate]) -> float:
     return max(1.0, best.cost / (0.5 * best.pieces))
 
 
-def _by_chance(one: Candidate, other: Candidate) -> float:
+def _chance_probability(one: Candidate, other: Candidate) -> float:
     """The probability that `one` predicts at least as well as `other` when conditions are resampled (Bayesian
     bootstrap, Rubin 1981), since how well a model explains the data differs from condition to condition."""
     costs = _by_condition([one, other], "unseen_by_trial", mean=True)
@@ -194,7 +196,7 @@ def _by_condition(candidates: Sequence[Candidate], which: str, *, mean: bool = F
     costs = [getattr(c, which) for c in candidates]
     trials = [t for t in candidates[0].trials if t.name in costs[0]]
     keys: list[Hashable] = [(t.experiment, t.condition) for t in trials]
-    if len(set(keys)) < _FEWEST:
+    if len(set(keys)) < _MIN_CONDITIONS:
         keys = [t.name for t in trials]
     places = {key: k for k, key in enumerate(dict.fromkeys(keys))}
     found = np.zeros((len(candidates), len(places)))
@@ -210,15 +212,17 @@ def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
     weights = _weights(compared, dispersion)
     no_larger = _weights([c for c in compared if len(c.effects) <= len(chosen.effects)], dispersion)
     rivals = _rivals(chosen.effects, no_larger, policy)
-    probability = {e: _behind(e, no_larger, rivals) for e in chosen.effects}
+    probability = {e: _total_weight(e, no_larger, rivals) for e in chosen.effects}
     confusable = {
         e: tuple(dict.fromkeys(f for effects in rivals if e not in effects for f in effects if f not in chosen.effects))
         for e in chosen.effects
     }
-    return Choice(chosen, search.freed_form(chosen), probability, confusable, weights, _beside(compared, weights))
+    return Choice(
+        chosen, search.freed_form(chosen), probability, confusable, weights, _compare_with_first(compared, weights)
+    )
 
 
-def _beside(compared: Sequence[Candidate], weights: dict[tuple[str, ...], float]) -> tuple[Compared, ...]:
+def _compare_with_first(compared: Sequence[Candidate], weights: dict[tuple[str, ...], float]) -> tuple[Compared, ...]:
     """Every explanation compared with the first."""
     costs = _by_condition(compared, "unseen_by_trial")
     apart, count = costs - costs[0], costs.shape[1]

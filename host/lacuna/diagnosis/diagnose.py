@@ -19,12 +19,12 @@ from lacuna.diagnosis.named import Estimated, Named, Nearest, describe_base, des
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
 from lacuna.diagnosis.nuisances import Followed
 from lacuna.diagnosis.policy import POLICY, Policy
-from lacuna.diagnosis.race import from_elsewhere
+from lacuna.diagnosis.race import refit_multi_start
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
 from lacuna.diagnosis.revise import eliminate, explain_nuisances, may_be_absent
 from lacuna.diagnosis.score import score
-from lacuna.diagnosis.search import Search, search, until_now
+from lacuna.diagnosis.search import Search, interrupted_search, search
 from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.workers import STOPPED, OnProgress, Stoppable, Workers
@@ -121,25 +121,25 @@ def diagnose(
     hand.on_progress("fitting the base model")
     found = explanations(case, case.fit_base(starts), hand)
     hand.on_progress("deciding what is supported")
-    found, choice, judged = decided(case, found, hand)
+    found, choice, judged = decide(case, found, hand)
     final = judged.explained
     if judged.verdict != "none" and judged.left.matters:
         final = hand.ask(
-            lambda: _corrected(case, found, choice, judged, hand.workers),
-            lambda: _corrected(case, found, choice, judged, None),
+            lambda: _add_learnt_curves(case, found, choice, judged, hand.workers),
+            lambda: _add_learnt_curves(case, found, choice, judged, None),
             "no curve is learnt",
         )
     final = shrunk(final)
     hand.on_progress("estimating how well the parameters are known")
     shown = choice.explanation if judged.verdict == "identified" else found.base
-    followed = warn.followed_by_nothing(case.followed(shown))
-    told = _told(case, judged, shown, final)
+    followed = warn.unexplained_nuisances(case.followed(shown))
+    told = _fit_to_report(case, judged, shown, final)
     said = (*cautions, *followed, *warn.warnings_of(told, split))
     reported = _reported(case, found, choice, judged, (final, told), said, time.monotonic() - began)
     return replace(reported, warnings=(STOPPED, *reported.warnings)) if hand.stopped else reported
 
 
-def decided(case: Case, found: Search, hand: Stoppable) -> tuple[Search, Choice, Assessed]:
+def decide(case: Case, found: Search, hand: Stoppable) -> tuple[Search, Choice, Assessment]:
     """Decide which effects to name, and the verdict. The returned search includes what was tried while deciding."""
     choice = hand.ask(
         lambda: _chosen(case, found, hand.workers),
@@ -152,14 +152,14 @@ def decided(case: Case, found: Search, hand: Stoppable) -> tuple[Search, Choice,
         lambda: (found, choice),
         "no effect is sought behind the nuisances",
     )
-    judged = _judged(case, found, choice)
-    while (smaller := _without_harm(case, found, choice, judged)) is not None:
+    judged = _assess(case, found, choice)
+    while (smaller := _drop_harmful_effect(case, found, choice, judged)) is not None:
         choice = smaller
-        judged = _judged(case, found, choice)
+        judged = _assess(case, found, choice)
     return found, choice, judged
 
 
-def _told(case: Case, judged: Assessed, shown: Candidate, final: Fit) -> Fit:
+def _fit_to_report(case: Case, judged: Assessment, shown: Candidate, final: Fit) -> Fit:
     """The fit that parameters are reported from: the explanation's, or the final model's if that has curves or nothing
     is explained."""
     if judged.verdict != "unexplained" and not final.structure.sites:
@@ -175,12 +175,12 @@ def _chosen(case: Case, found: Search, workers: Workers) -> Choice:
     if len(found.tried) == 1 or not is_due(case):
         return choose(found, case.policy, case.exceeds)
     choice = choose(cross_fitted(case, found, workers), case.policy, case.exceeds)
-    originals = {judged: one for one, judged in case.by_turns.items()}
+    originals = {judged: one for one, judged in case.cross_validated.items()}
     return replace(choice, candidate=originals[choice.candidate], freed=choice.freed and originals[choice.freed])
 
 
 @dataclass(frozen=True)
-class Assessed:
+class Assessment:
     """The verdict and its evidence: both models fitted to all known trials (`Case.converged`), their errors `before`
     and `after`, and what each leaves (`remainder`, `left`). `unshared`: a sentence, if the base model lacks something
     that matters although repeats do not demonstrably share it; otherwise empty. `floor` and `drifts` are computed with
@@ -201,7 +201,7 @@ class Assessed:
     tested: float | None
 
 
-def _judged(case: Case, found: Search, choice: Choice) -> Assessed:
+def _assess(case: Case, found: Search, choice: Choice) -> Assessment:
     base, chosen = case.converged(found.base), case.converged(choice.explanation)
     remainder, drifts = case.remainder_of(found.base), find_drift(chosen, policy=case.policy, seed=case.seed)
     unshared = "" if remainder.matters else _unshared(case, choice, found)
@@ -218,7 +218,7 @@ def _judged(case: Case, found: Search, choice: Choice) -> Assessed:
         left = case.remainder_of(choice.explanation)
     else:
         chosen, after = base, before
-    return Assessed(verdict, base, chosen, before, after, remainder, left, unshared, floor, drifts, tested)
+    return Assessment(verdict, base, chosen, before, after, remainder, left, unshared, floor, drifts, tested)
 
 
 def _explains(case: Case, found: Search, choice: Choice, unshared: str, tested: float | None) -> bool:
@@ -226,12 +226,12 @@ def _explains(case: Case, found: Search, choice: Choice, unshared: str, tested: 
     if not choice.candidate.effects:
         return False
     # what passes for noise or is absorbed by nuisances leaves no gap of which half could be closed
-    hidden, half = bool(unshared or _taken_up(case, choice, found)), case.policy.half
+    hidden, half = bool(unshared or _explained_nuisances(case, choice, found)), case.policy.half
     closes = case.closed(choice.explanation, found.base) >= half or (hidden and case.suffices(choice.explanation))
     return closes and (tested is None or tested >= half)
 
 
-def _without_harm(case: Case, found: Search, choice: Choice, judged: Assessed) -> Choice | None:
+def _drop_harmful_effect(case: Case, found: Search, choice: Choice, judged: Assessment) -> Choice | None:
     """`choice` without the effect whose removal improves the prediction of the final trials most, if there is one and
     it is not the only effect. The final trials inform no choice, but an effect that they contradict is not named."""
     if judged.tested is None or len(choice.candidate.effects) < 2:
@@ -248,26 +248,28 @@ def _without_harm(case: Case, found: Search, choice: Choice, judged: Assessed) -
 def _unshared(case: Case, choice: Choice, found: Search) -> str:
     if hidden := case.hidden(found.base):
         return f"What repeats differ by, or what their nuisances absorb, is not noise: {hidden} would explain it."
-    if choice.candidate.effects and case.dominated(found.base, choice.explanation):
+    if choice.candidate.effects and case.is_dominated(found.base, choice.explanation):
         named = " and ".join(choice.candidate.effects)
         return f"The residual that repeats share may be chance, but {named} would remove a part of it that matters."
-    if choice.candidate.effects and (taken_up := _taken_up(case, choice, found)):
+    if choice.candidate.effects and (taken_up := _explained_nuisances(case, choice, found)):
         return f"{warn.follow_in_words(taken_up)}: {' and '.join(choice.candidate.effects)} explains it."
     return ""
 
 
-def _taken_up(case: Case, choice: Choice, found: Search) -> list[Followed]:
+def _explained_nuisances(case: Case, choice: Choice, found: Search) -> list[Followed]:
     """The nuisances that follow the condition with the base model but not with the chosen explanation."""
     still = {one.nuisance for one in case.followed(choice.explanation)}
     return [one for one in case.followed(found.base) if one.nuisance not in still]
 
 
-def _doubts(case: Case, choice: Choice, judged: Assessed, effects: tuple[Named, ...]) -> list[str]:
+def _doubts(case: Case, choice: Choice, judged: Assessment, effects: tuple[Named, ...]) -> list[str]:
     """Warnings that qualify a verdict naming `effects`, which may be empty."""
     if judged.verdict == "none":
         return warn.not_predicted(judged.base, case.split, judged.before, judged.floor, case.policy)
     if not effects:
-        return warn.but_too_little(choice, case.split, judged.tested, case.policy) if choice.candidate.effects else []
+        return (
+            warn.explains_too_little(choice, case.split, judged.tested, case.policy) if choice.candidate.effects else []
+        )
     within, library = case.intervals(choice.candidate), case.system.effects
     absent = [name for name in choice.candidate.effects if may_be_absent(library[name], within)]
     return [*warn.doubts(choice, case.split, judged.tested), *warn.perhaps_absent(absent)]
@@ -277,7 +279,7 @@ def _reported(
     case: Case,
     found: Search,
     choice: Choice,
-    judged: Assessed,
+    judged: Assessment,
     fits: tuple[Fit, Fit],
     said: tuple[str, ...],
     seconds: float,
@@ -324,20 +326,20 @@ def explanations(case: Case, base: Fit, hand: Stoppable) -> Search:
     first = case.judge(base)
     if case.may_be_lost(first):
         hand.on_progress("fitting the base model from other starts, too")
-        first = from_elsewhere(first, case.split, case.seed, hand.workers)
-    first = case.sharply(first)
+        first = refit_multi_start(first, case.split, case.seed, hand.workers)
+    first = case.sharpen(first)
     if case.suffices(first):
         screened = score(first.fitted, list(case.system.effects), hand.workers).screened()
         return Search(first, first.fitted.problem.floor, (first,), screened)
     kept: list[Candidate] = []
     return hand.ask(
         lambda: search(case, first, enough=case.suffices, workers=hand.workers, keep=kept.extend),
-        lambda: until_now(first, kept, case.split),
+        lambda: interrupted_search(first, kept, case.split),
         "judging what has been fitted so far",
     )
 
 
-def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, workers: Workers | None) -> Fit:
+def _add_learnt_curves(case: Case, found: Search, choice: Choice, judged: Assessment, workers: Workers | None) -> Fit:
     """The explained model with learnt curves on top, if they also improve the final trials; without workers no curves
     are learnt. If no mechanism is supported, everything tried competes with the curves, so that the final model is
     never worse than the best of these."""

@@ -12,7 +12,7 @@ from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
 
 _SHUFFLES = 2000
-_FEWEST = 6  # ordered trials, and effective number of trials that inform a parameter
+_MIN_TRIALS = 6  # ordered trials, and effective number of trials that inform a parameter
 
 
 class Drift(NamedTuple):
@@ -36,27 +36,27 @@ def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[
     trials = fitted.problem.trials
     places = {k: t.session_order for k, t in enumerate(trials) if t.session_order is not None}
     ordered = list(places)
-    if len(ordered) < _FEWEST or not fitted.solution.sensitivities:
+    if len(ordered) < _MIN_TRIALS or not fitted.solution.sensitivities:
         return ()
     order = np.array([float(place) for place in places.values()])
-    columns, asked, weights = _asked(fitted, ordered)
+    columns, trial_shifts, weights = _shifts_by_trial(fitted, ordered)
     if not columns:
         return ()
-    observed = _trend(asked, weights, order)
+    observed = _trend(trial_shifts, weights, order)
     draw = np.random.default_rng(seed)
-    largest = [_trend(asked, weights, draw.permutation(order)).max() for _ in range(_SHUFFLES)]
+    largest = [_trend(trial_shifts, weights, draw.permutation(order)).max() for _ in range(_SHUFFLES)]
     limit = np.quantile(largest, 1 - policy.drift_chance)
     return tuple(
         Drift(fitted.structure.names[fitted.solution.free[columns[k]]], _added(fitted, ordered, columns[k], moved))
-        for k, moved in enumerate(_moved(asked, weights, order))
+        for k, moved in enumerate(_moved(trial_shifts, weights, order))
         if observed[k] > limit
     )
 
 
-def _moved(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:
+def _moved(trial_shifts: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:
     """Each parameter's shift in each trial, from a weighted straight-line fit to the trials' shifts, shape (P, n)."""
     place = order - (weights @ order / weights.sum(axis=1))[:, None]
-    slope = (weights * asked * place).sum(axis=1) / np.maximum((weights * place**2).sum(axis=1), 1e-300)
+    slope = (weights * trial_shifts * place).sum(axis=1) / np.maximum((weights * place**2).sum(axis=1), 1e-300)
     return slope[:, None] * place
 
 
@@ -83,10 +83,10 @@ def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> f
     return max(squares[e] / pieces[e] for e in squares)
 
 
-def _asked(fitted: Fit, ordered: list[int]) -> tuple[list[int], np.ndarray, np.ndarray]:
+def _shifts_by_trial(fitted: Fit, ordered: list[int]) -> tuple[list[int], np.ndarray, np.ndarray]:
     """Columns of the parameters that enough trials inform, with each trial's shift and its weight, shapes (P, n)."""
     residuals, jacobians = fitted.problem.residuals(fitted.solution.point), fitted.solution.jacobians
-    columns, asked, weights = [], [], []
+    columns, trial_shifts, weights = [], [], []
     for column, index in enumerate(fitted.solution.free):
         if index >= fitted.structure.base_size:
             continue
@@ -95,11 +95,11 @@ def _asked(fitted: Fit, ordered: list[int]) -> tuple[list[int], np.ndarray, np.n
         pulls = np.array([-float(d @ r) for d, r in pairs])
         shifts = np.divide(pulls, known, out=np.zeros_like(pulls), where=known > 0)
         weight = _weights(shifts, known)
-        if _effective(weight) >= _FEWEST:
+        if _effective(weight) >= _MIN_TRIALS:
             columns.append(column)
-            asked.append(shifts)
+            trial_shifts.append(shifts)
             weights.append(weight)
-    return columns, np.array(asked), np.array(weights)
+    return columns, np.array(trial_shifts), np.array(weights)
 
 
 def _weights(shifts: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -118,10 +118,10 @@ def _effective(weight: np.ndarray) -> float:
     return float(weight.sum()) ** 2 / square if square > 0 else 0.0
 
 
-def _trend(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:
+def _trend(trial_shifts: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:
     """Weighted correlation of each parameter's shifts with the order, as a z-score (Fisher's transform), shape (P,)."""
     total = weights.sum(axis=1)
-    shift = asked - ((weights * asked).sum(axis=1) / total)[:, None]
+    shift = trial_shifts - ((weights * trial_shifts).sum(axis=1) / total)[:, None]
     place = order - ((weights @ order) / total)[:, None]
     both, squares, spread = ((weights * product).sum(axis=1) for product in (shift * place, shift**2, place**2))
     correlation = np.abs(both) / np.sqrt(np.maximum(squares * spread, 1e-300))

@@ -19,9 +19,9 @@ from lacuna.estimation.solve import Solution, solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 
-_MOST = 4  # largest number of curves in one correction
-_FITTED = 4  # number of sites where a curve is fitted coarsely, most promising first
-_SOUGHT = 8  # number of sites where further curves are sought
+_MAX_CURVES = 4  # largest number of curves in one correction
+_MAX_SITES_FITTED = 4  # number of sites where a curve is fitted coarsely, most promising first
+_MAX_SITES_KEPT = 8  # number of sites where further curves are sought
 _PROMISING = 0.5  # relative to the best promise: curves that promise less are not fitted
 _COARSE: dict[str, Any] = {"max_iterations": 8, "relative": 3e-3}
 _REFINED: dict[str, Any] = {"max_iterations": 20, "relative": 3e-4}
@@ -43,7 +43,7 @@ def free_form(candidate: Candidate, split: Split, workers: Workers) -> Candidate
     if not sites:
         return None
     promises = sorted(_promises(candidate, list(sites), split, workers), key=lambda p: p.cost)
-    return _best_grown([candidate], promises[:_FITTED], split, workers)
+    return _best_grown([candidate], promises[:_MAX_SITES_FITTED], split, workers)
 
 
 def learn_correction(
@@ -54,13 +54,13 @@ def learn_correction(
     to. After the first regression only the most promising sites are considered. None if no curve helps."""
     best: Candidate | None = None
     sites = list(candidates[0].fitted.structure.system.correction_sites)
-    while best is None or len(best.fitted.structure.sites) < _MOST:
+    while best is None or len(best.fitted.structure.sites) < _MAX_CURVES:
         parents = [best] if best else candidates
         promises: list[_Promise] = []
         for parent in parents:
             promises = sorted([*promises, *_promises(parent, sites, split, workers)], key=lambda p: p.cost)
-            sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]
-        grown = _best_grown(parents, promises[:_FITTED], split, workers)
+            sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_MAX_SITES_KEPT]
+        grown = _best_grown(parents, promises[:_MAX_SITES_FITTED], split, workers)
         if grown is None:
             break
         best = grown

@@ -19,7 +19,7 @@ from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
 from lacuna.system import Parameter, Record
 
-_DEALT = 2000  # permutations of runs
+_PERMUTATIONS = 2000  # permutations of runs
 
 Runs = Mapping[str, Sequence[np.ndarray]]  # by nuisance, one array for each condition with a value for each run
 
@@ -45,8 +45,8 @@ class NuisanceOfRun(NamedTuple):
 
 
 def runs_of(fits: Sequence[Fit]) -> Iterator[NuisanceOfRun]:
-    """Every nuisance of every trial of these fits, except effects' own per-trial parameters (such as phases), for which
-    no value is more expected than another."""
+    """Every nuisance of every trial of these fits, except effects' own per-trial parameters (such as phases), which may
+    take any value."""
     for fit in fits:
         every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
         for trial, values, parameters in every:
@@ -63,16 +63,16 @@ def find_followed(fits: Sequence[Fit], *, policy: Policy, seed: int = 0) -> tupl
     The mean product of two repeats' nuisances, in standard deviations from the mean of all runs, estimates the mean
     square of what they share. Its distribution under chance comes from permuting runs among conditions.
     """
-    felt = _felt(fits[0])
-    tested = {name: runs for name, runs in by_condition(fits).items() if name in felt and _pairs(runs)}
+    per_sd = _mean_squares_per_sd(fits[0])
+    tested = {name: runs for name, runs in by_condition(fits).items() if name in per_sd and _pairs(runs)}
     draw, found = np.random.default_rng(seed), []
     for name, runs in tested.items():
         values = np.concatenate(runs)
         values = values - values.mean()
         shared, whole = _shared(runs, values), float(np.mean(values**2))
-        by_chance = np.array([_shared(runs, draw.permutation(values)) for _ in range(_DEALT)])
-        chance = (1 + np.count_nonzero(by_chance >= shared)) / (1 + _DEALT)
-        adds = felt[name] * shared / (1.0 + felt[name] * max(whole - shared, 0.0))
+        by_chance = np.array([_shared(runs, draw.permutation(values)) for _ in range(_PERMUTATIONS)])
+        chance = (1 + np.count_nonzero(by_chance >= shared)) / (1 + _PERMUTATIONS)
+        adds = per_sd[name] * shared / (1.0 + per_sd[name] * max(whole - shared, 0.0))
         if len(tested) * chance < policy.chance and adds > policy.relevance:
             found.append(Followed(name, min(shared / whole, 1.0)))
     return tuple(sorted(found, key=lambda one: -one.share))
@@ -104,7 +104,7 @@ def by_condition(fits: Sequence[Fit]) -> Runs:
     return {name: [np.array(runs) for runs in conditions.values()] for name, conditions in found.items()}
 
 
-def _felt(fit: Fit) -> dict[str, float]:
+def _mean_squares_per_sd(fit: Fit) -> dict[str, float]:
     """Mean square residual, in units of the floor's variance, caused by one standard deviation of each nuisance."""
     squares: dict[str, list[float]] = defaultdict(list)
     every = zip(fit.problem.trials, fit.solution.sensitivities, fit.problem.nuisances, strict=False)

@@ -119,7 +119,7 @@ class Policy:
 
     # What is learnt?
     curve: float = _rule(
-        0.1, "of what is left beyond noise on trials not fitted", "what each further curve must remove", "simulation"
+        0.1, "of what is left beyond noise on trials not fitted", "what each curve must remove", "simulation"
     )
 
     @classmethod

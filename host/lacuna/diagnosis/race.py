@@ -18,16 +18,16 @@ from lacuna.diagnosis.score import Promise
 from lacuna.diagnosis.sizes import one_more
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.fit import Fit, best_of, renewed, spread_starts
+from lacuna.estimation.fit import Fit, best_of, continue_search, spread_starts
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
 
 COARSE: dict[str, Any] = {"max_iterations": 12, "relative": 3e-3}
-_TO_THE_END: dict[str, Any] = {"max_iterations": 40, "relative": 1e-4}
+_CONVERGENCE: dict[str, Any] = {"max_iterations": 40, "relative": 1e-4}
 _FIRST = 2  # number of promises fitted first: if the better one is enough, only its rivals follow
-_ELSEWHERE = 3  # number of further starts of a base model besides its initial guess
+_RANDOM_STARTS = 3  # number of further starts of a base model besides its initial guess
 NEAR = 1.3  # times the cost of a converged fit: a start or coarse fit that costs more is not worth pursuing
 
 
@@ -82,7 +82,7 @@ def race(
     keep(raced)
     leading = min(raced, key=_cost, default=None)
     if leading and leading.checked_error <= (0, policy.lost):
-        done = to_the_end([leading], split, workers)
+        done = fit_to_convergence([leading], split, workers)
         raced.remove(leading)
         keep(done)
         if enough(done[0]):
@@ -91,7 +91,7 @@ def race(
     raced = sorted([*raced, *coarse_fits(parent, rest, split, workers)], key=_cost)
     keep(raced)
     chosen = [c for c in raced if _worth_it(c, parent, done, enough)][: most - len(done)]
-    done += to_the_end(chosen, split, workers)
+    done += fit_to_convergence(chosen, split, workers)
     keep(done)
     return sorted([*done, *(c for c in raced if c not in chosen)], key=_cost)
 
@@ -114,12 +114,12 @@ def _cost(candidate: Candidate) -> float:
 def coarse_fits(parent: Candidate, promises: Sequence[Promise], split: Split, workers: Workers) -> list[Candidate]:
     names = [one.problem.structure.effects for one in promises]
     jobs = [(one.problem, cold_starts(one), one.start, parent.fitted.cost) for one in promises]
-    solutions = workers.map("fitting", names, _begun, jobs)
+    solutions = workers.map("fitting", names, _fit_coarsely, jobs)
     fits = [Fit(one.problem, solution, 1, 1) for one, solution in zip(promises, solutions, strict=True)]
     return [judge(fitted, split, parent.policy, near=parent.checked) for fitted in fits]
 
 
-def _begun(problem: Problem, begins: Sequence[np.ndarray], warm: Point, contained: float) -> Solution:
+def _fit_coarsely(problem: Problem, begins: Sequence[np.ndarray], warm: Point, contained: float) -> Solution:
     found = min((cold(problem, values) for values in begins), key=lambda s: s.cost)
     if found.cost <= contained:
         return found
@@ -131,7 +131,7 @@ def cold(problem: Problem, values: np.ndarray) -> Solution:
     return solve_graduated(problem, values, **COARSE)
 
 
-def to_the_end(candidates: Sequence[Candidate], split: Split, workers: Workers) -> list[Candidate]:
+def fit_to_convergence(candidates: Sequence[Candidate], split: Split, workers: Workers) -> list[Candidate]:
     """Fit candidates to convergence; each is returned unchanged if that does not lower its cost."""
     jobs = [(c.fitted.problem, c.fitted.solution) for c in candidates]
     solutions = workers.map("finishing", [c.effects for c in candidates], converged, jobs)
@@ -143,16 +143,16 @@ def to_the_end(candidates: Sequence[Candidate], split: Split, workers: Workers) 
 def converged(problem: Problem, coarse: Solution) -> Solution:
     """Graduate a coarse solution once more and follow the better of the two to convergence. With the effects at their
     fitted sizes, the trials that isolate parameters pull back those that had been drawn into a wrong basin."""
-    again = solve_graduated(problem, coarse.point.values, **_TO_THE_END)
-    return renewed(problem, min(coarse, again, key=lambda s: s.cost), **_TO_THE_END)
+    again = solve_graduated(problem, coarse.point.values, **_CONVERGENCE)
+    return continue_search(problem, min(coarse, again, key=lambda s: s.cost), **_CONVERGENCE)
 
 
-def from_elsewhere(candidate: Candidate, split: Split, seed: int, workers: Workers) -> Candidate:
+def refit_multi_start(candidate: Candidate, split: Split, seed: int, workers: Workers) -> Candidate:
     """The better of a converged explanation and its refits from random plausible base parameters (multi-start), begun
     with its effects at their fitted values."""
     fitted, structure = candidate.fitted, candidate.fitted.structure
     problem, values = fitted.problem, fitted.solution.point.values
-    begun = spread_starts(structure, values, 1 + _ELSEWHERE, seed)[1:]
+    begun = spread_starts(structure, values, 1 + _RANDOM_STARTS, seed)[1:]
     for start in begun:
         start[structure.base_size :] = values[structure.base_size :]
     jobs = [(problem, start) for start in begun]
@@ -164,16 +164,16 @@ def from_elsewhere(candidate: Candidate, split: Split, seed: int, workers: Worke
     return min(candidate, ended, key=_cost)
 
 
-def continued(parent: Fit, effects: Sequence[str], workers: Workers) -> list[Fit]:
+def add_each_effect(parent: Fit, effects: Sequence[str], workers: Workers) -> list[Fit]:
     """Coarse fits of `parent` with each of `effects` added, from the parent's optimum. This warm start is adequate
     because the parent leaves little, so that its parameters are near the truth."""
     library = parent.structure.system.effects
     jobs = [(*one_more(parent, effect), bool(library[effect].apart)) for effect in effects]
-    found = workers.map("trying", [problem.structure.effects for problem, *_ in jobs], _continued, jobs)
+    found = workers.map("trying", [problem.structure.effects for problem, *_ in jobs], _add_effect, jobs)
     return [Fit(job[0], solution, 1, 1) for job, solution in zip(jobs, found, strict=True)]
 
 
-def helps_at_once(parent: Fit, effect: str, gain: float) -> bool:
+def helps_without_refit(parent: Fit, effect: str, gain: float) -> bool:
     """Whether an effect gains `gain` in log-likelihood at one of its start sizes with nothing refitted but its own
     per-trial parameters: a quick test."""
     problem, vectors, nuisances = one_more(parent, effect)
@@ -181,7 +181,9 @@ def helps_at_once(parent: Fit, effect: str, gain: float) -> bool:
     return any(cost_of(problem, start) < parent.cost - gain for start in begun)
 
 
-def _continued(problem: Problem, sizes: Sequence[np.ndarray], nuisances: Sequence[np.ndarray], apart: bool) -> Solution:
+def _add_effect(
+    problem: Problem, sizes: Sequence[np.ndarray], nuisances: Sequence[np.ndarray], apart: bool
+) -> Solution:
     """Fit from the best start size, or if `apart` from each of them, since the effect does nothing at the parent's
     parameters and the costs at the start do not tell the sizes apart."""
     begun = sorted((problem.start(values, nuisances) for values in sizes), key=lambda start: cost_of(problem, start))

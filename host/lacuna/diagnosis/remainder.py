@@ -23,7 +23,7 @@ from lacuna.system import Channels, Record, System, groups_of_repeats
 _DRAWS = 200
 _AT_ONCE = 2_000_000  # samples drawn at once, to bound memory
 _TAIL = 0.1
-_SURELY = 1.645  # standard deviations: one-sided, 95 %
+_Z_95 = 1.645  # standard deviations: one-sided, 95 %
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Remainder:
         bound has to lie below what matters (an equivalence test), not just the estimate."""
         found = {}
         for experiment in {e for e, _ in self.shared} if self.sd else ():
-            most = {key: max(shared, 0.0) + _SURELY * self.sd[key] for key, shared in self.shared.items()}
+            most = {key: max(shared, 0.0) + _Z_95 * self.sd[key] for key, shared in self.shared.items()}
             mean = self._mean(most, experiment)
             if mean > self.policy.relevance:
                 found[experiment] = float(np.sqrt(mean))
@@ -114,7 +114,7 @@ def find_remainder(
 def _of_repeats(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> tuple[float, float, float, float]:
     """For repeated conditions: `shared`, its z-score, the probability of exceeding it by chance, and its standard
     deviation under chance."""
-    shared, by_chance = _shared(conditions), _by_chance(conditions, draw)
+    shared, by_chance = _shared(conditions), _null_distribution(conditions, draw)
     z = (shared - by_chance.mean()) / max(by_chance.std(), 1e-12)
     return shared, float(z), _exceeded(by_chance, shared), float(by_chance.std())
 
@@ -177,7 +177,7 @@ def _shared(conditions: Sequence[np.ndarray]) -> float:
     return total / count
 
 
-def _by_chance(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> np.ndarray:
+def _null_distribution(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> np.ndarray:
     """Draw `_shared` of noise alone, `_DRAWS` times, from noise traces with random sign, order and time shift."""
     differences = [(rows[a] - rows[b]) / np.sqrt(2) for rows in conditions for a in range(len(rows)) for b in range(a)]
     noise = [known for known in (d[np.isfinite(d)] for d in differences) if known.size]

@@ -29,7 +29,7 @@ class Error:
 
 @dataclass(frozen=True)
 class Floor:
-    """RMS difference between repeats of one condition, in the same units: no model can do better."""
+    """RMS noise, from the differences between repeats, in the same units: no model can do better."""
 
     fitted: float
     held_out: float
@@ -131,7 +131,7 @@ def failed(every: Iterable[tuple[Record, Channels]]) -> list[str]:
 
 
 def at_full_size(fits: Iterable[Fit]) -> tuple[int, float]:
-    """The number of trials that the fits cannot predict, and the RMS residual of the others, without compression."""
+    """The number of trials not predicted in full, and the RMS of all residuals that exist, without compression."""
     every = list(with_residuals(fits))
     return len(failed(every)), rms(channels for _, channels in every)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from lacuna.diagnosis.candidate import Candidate, judge, refitted_without
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import Choice, Comparison, weigh
-from lacuna.diagnosis.race import continued, to_the_end
+from lacuna.diagnosis.race import add_each_effect, fit_to_convergence
 from lacuna.diagnosis.search import Search, keep_best, reweighed
 from lacuna.diagnosis.workers import Workers
 from lacuna.system import Effect
@@ -79,10 +79,10 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, workers: Worker
         parent = reweighed(parent, case.split, found.floor)
     fresh = [name for name in case.system.effects if name not in parent.effects]
     workers.on_progress(f"looking for an effect behind {followed[0].nuisance}")
-    near = continued(parent.fitted, fresh, workers)
+    near = add_each_effect(parent.fitted, fresh, workers)
     grown = sorted((judge(fitted, case.split, policy, near=parent.checked) for fitted in near), key=lambda c: c.cost)
     promising = [c for c in grown if parent.cost - c.cost > policy.gain][:_FINISHED]
-    finished = to_the_end(promising, case.split, workers)
+    finished = fit_to_convergence(promising, case.split, workers)
     tried = {frozenset(c.effects): c for c in found.tried}
     keep_best(tried, (*grown, *finished))
     found = replace(found, tried=tuple(tried.values()))

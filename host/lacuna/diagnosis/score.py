@@ -21,8 +21,8 @@ from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.problem import Point, Problem
 
-_LONGEST = 3.0  # largest factor by which a secant is scaled: it is no guide beyond
-_ABSORBED = 0.02  # a change counts as absorbed if less than this share of its norm is left after projection
+_MAX_FACTOR = 3.0  # largest factor by which a secant is scaled: it is no guide beyond
+_MIN_SHARE_LEFT = 0.02  # a change counts as absorbed if less than this share of its norm is left after projection
 
 
 class Promise(NamedTuple):
@@ -76,12 +76,12 @@ class Scores:
     @cached_property
     def _seen(self) -> np.ndarray:
         """Which secants are not absorbed; what is left of the others is only their nonlinearity."""
-        return np.sqrt(self.squares) > _ABSORBED * self.whole
+        return np.sqrt(self.squares) > _MIN_SHARE_LEFT * self.whole
 
     @cached_property
     def gains(self) -> np.ndarray:
         """Log-likelihood that each secant would gain at its best scale factor."""
-        far = np.where(self._seen, np.clip(-self.push / self.squares, 0.0, _LONGEST), 0.0)
+        far = np.where(self._seen, np.clip(-self.push / self.squares, 0.0, _MAX_FACTOR), 0.0)
         return -(far * self.push + 0.5 * far**2 * self.squares)
 
     def singles(self) -> list[Promise]:

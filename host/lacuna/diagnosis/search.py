@@ -14,7 +14,7 @@ from lacuna.diagnosis.score import Promise, Scores, Screened, score
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import reweigh, starting_point
-from lacuna.estimation.noise import LOWER, NoiseFloor
+from lacuna.estimation.noise import REFIT_SHARE, NoiseFloor
 from lacuna.estimation.solve import cost_of
 from lacuna.system import Effect
 
@@ -23,7 +23,7 @@ _RACED = {1: 6, 2: 6, 3: 4}  # number of sets raced, by set size,
 _FINISHED = {1: 3, 2: 3, 3: 1}  # and of these the number fitted to convergence
 _PARENTS, _JOINED = 2, 3  # number of best sets that larger ones grow from, and that are joined in pairs
 _REWEIGHED_ITERATIONS = 5
-_LEAST = 3.0  # log-likelihood: an effect that gains less counts as not seen
+_MIN_GAIN = 3.0  # log-likelihood: an effect that gains less counts as not seen
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class Search:
     @property
     def unseen(self) -> list[str]:
         """Effects that the data would hardly show, neither at their typical size nor at any other size tried."""
-        told = {c.effects for c in self.tried if self.base.cost - c.cost > _LEAST}
-        return [s.effect for s in self.screened if not s.detectable and (s.effect,) not in told]
+        gaining = {c.effects for c in self.tried if self.base.cost - c.cost > _MIN_GAIN}
+        return [s.effect for s in self.screened if not s.detectable and (s.effect,) not in gaining]
 
     def freed_form(self, candidate: Candidate) -> Candidate | None:
         """The same effects in freed form, if that explains more; otherwise None."""
@@ -74,7 +74,7 @@ def search(
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
     freed: list[Candidate] = []
     found = raced(first, _singles(case, scores))
-    if better := led_out(first, found, split):
+    if better := escape_local_optimum(first, found, split):
         workers.on_progress("the base model was in a local optimum: continuing from a better one")
         if enough(better):
             return Search(better, floor, (better, *found), scores.screened())
@@ -87,10 +87,10 @@ def search(
         if not ranked:
             break
         lower = sharpened_floor(ranked[0], split, floor)
-        if lower.share_of(floor) < LOWER:
+        if lower.share_of(floor) < REFIT_SHARE:
             workers.on_progress("weighing again against a lower floor")
             floor = lower
-            tried = _against(tried, size, split, lower, case.policy.reach)
+            tried = _reweigh_all(tried, size, split, lower, case.policy.reach)
             freed = [reweighed(c, split, lower) for c in freed]
             ranked = _ranked(tried, size)
         if enough(ranked[0]):
@@ -106,7 +106,7 @@ def search(
     return Search(tried[frozenset()], floor, tuple(tried.values()), scores.screened(), tuple(freed))
 
 
-def until_now(base: Candidate, kept: Sequence[Candidate], split: Split) -> Search:
+def interrupted_search(base: Candidate, kept: Sequence[Candidate], split: Split) -> Search:
     """The result of an interrupted search: for each set of effects the best of the `kept` candidates, all against the
     latest floor."""
     floor = (kept[-1] if kept else base).fitted.problem.floor
@@ -132,10 +132,14 @@ def _singles(case: Case, scores: Scores) -> list[Promise]:
     """The effects with the best scores, those that a score may miss, and the suspected ones."""
     library = case.system.effects
     singles = (one._replace(suspected=one.effect in case.suspected) for one in scores.singles())
-    return [one for rank, one in enumerate(singles) if rank < _RACED[1] or _blind(library[one.effect]) or one.suspected]
+    return [
+        one
+        for rank, one in enumerate(singles)
+        if rank < _RACED[1] or _may_be_missed(library[one.effect]) or one.suspected
+    ]
 
 
-def _blind(effect: Effect) -> bool:
+def _may_be_missed(effect: Effect) -> bool:
     """Whether a score may miss an effect: it has values of its own in every trial or a frequency, or it does nothing at
     the parent's parameters (`Effect.apart`)."""
     return bool(effect.own or effect.apart or effect.frequency)
@@ -181,7 +185,7 @@ def with_derivatives(candidate: Candidate) -> Candidate:
     return Candidate(fitted, candidate.checked, candidate.policy)
 
 
-def led_out(base: Candidate, singles: Sequence[Candidate], split: Split) -> Candidate | None:
+def escape_local_optimum(base: Candidate, singles: Sequence[Candidate], split: Split) -> Candidate | None:
     """The base model refitted from the single-effect fit at whose parameters it costs least, if that explains more than
     `base` does: part of what the effects seemed to explain was then due to the base fit's local optimum."""
     problem = base.fitted.problem
@@ -193,10 +197,10 @@ def led_out(base: Candidate, singles: Sequence[Candidate], split: Split) -> Cand
     if nearest is None or costs[nearest] > NEAR * base.fitted.cost:
         return None
     better = refitted_without(nearest, (), split)
-    return better if base.cost - better.cost > max(base.policy.promising * base.excess, _LEAST) else None
+    return better if base.cost - better.cost > max(base.policy.promising * base.excess, _MIN_GAIN) else None
 
 
-def _against(
+def _reweigh_all(
     tried: dict[frozenset[str], Candidate], size: int, split: Split, floor: NoiseFloor, reach: float
 ) -> dict[frozenset[str], Candidate]:
     """Everything tried against another floor; the base model and what may still win are refitted."""

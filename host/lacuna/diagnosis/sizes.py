@@ -26,7 +26,7 @@ def grown(parent: Fit, effect: str) -> Problem:
 def starts(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
     """Starting vectors: the parent's values with the effect at a grid of sizes of either sign."""
     described = structure.system.effects[effect]
-    base = structure.parted(starting_point(parent, structure), effect)
+    base = structure.separate_ordered(starting_point(parent, structure), effect)
     vectors = [v for factor in described.start_factors for v in sized(structure, base, effect, factor)]
     if described.frequency is None:
         return vectors

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import median_filter
 
-from lacuna.estimation.sampling import evenly, sample_period
+from lacuna.estimation.sampling import resample_evenly, sample_period
 from lacuna.system import Channels, Record
 
 _CELLS_A_LINE = 3  # minimum number of grid cells within a spectral line's width in the longest record
 _MOST_CELLS = 200_000
 _LOCAL = 100  # cells over which the background is taken that a peak must stand out from
-_LONGEST = 20.0  # cap on a trial's power at a frequency, in multiples of its background
+_MAX_POWER_RATIO = 20.0  # cap on a trial's power at a frequency, in multiples of its background
 
 
 def peaks(
@@ -30,9 +30,9 @@ def peaks(
         sample_s = sample_period(trial.time_s)
         resolved = (frequencies > 1.5 / (trial.time_s[-1] - trial.time_s[0])) & (frequencies < 0.4 / sample_s)
         for residual in channels.values():
-            power = _power(np.nan_to_num(evenly(trial.time_s, residual)), sample_s, frequencies, resolution_hz)
+            power = _power(np.nan_to_num(resample_evenly(trial.time_s, residual)), sample_s, frequencies, resolution_hz)
             background = median_filter(power, size=_LOCAL, mode="nearest")
-            pooled += resolved * np.minimum(power / np.maximum(background, 1e-30), _LONGEST)
+            pooled += resolved * np.minimum(power / np.maximum(background, 1e-30), _MAX_POWER_RATIO)
             weight += resolved
     mean = pooled / np.maximum(weight, 1.0)
     found, _ = find_peaks(mean)

@@ -52,8 +52,8 @@ def split_trials(
     trials: Sequence[Record], spare: Collection[tuple[str, Hashable]] = (), test: Collection[str] = ()
 ) -> Split:
     """Split by whole trials; deterministic. `test`: names of the trials to be `final`, if the user chooses them; those
-    that would be `final` otherwise then go to `select`. Raises MisuseError (TooLittleDataError) if the others do not
-    suffice for fitting and judging.
+    that would be `final` otherwise then go to `select`. Raises MisuseError if the others do not suffice
+    to fit, to judge, or to estimate the noise.
 
     `spare`: (experiment, condition) pairs that are never fitted: the last repeat of each is `final`, the others are
     `unseen`. Of three or more repeats of any other condition a third goes to `final` and a third to `select`, rotating

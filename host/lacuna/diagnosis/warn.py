@@ -16,8 +16,8 @@ from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.structure import is_learnt
 from lacuna.estimation.uncertainty import Estimate, pieces_of, uncertainty
 
-_SURELY = 4.0  # standard deviations
-_APART = 3.0  # times the noise: residuals of repeats hardly differ by as much unless their predictions do
+_MIN_Z = 4.0  # standard deviations
+_MAX_REPEAT_RATIO = 3.0  # times the noise: residuals of repeats hardly differ by as much unless their predictions do
 _NEAR_LIMIT = 3.5  # standard deviations from its mean beyond which a nuisance probably absorbs model error
 
 
@@ -25,7 +25,7 @@ def not_predicted(found: Fit, split: Split, error: Error, floor: Floor, policy: 
     """For the verdict `none`: a warning if held-out records are predicted significantly worse than the noise."""
     pieces = sum(pieces_of(trial, found.problem.floor) for trial in split.final)
     above = error.held_out**2 - floor.held_out**2 if split.final else 0.0
-    if above <= policy.relevance * floor.held_out**2 or above < _SURELY * floor.held_out**2 * (2.0 / pieces) ** 0.5:
+    if above <= policy.relevance * floor.held_out**2 or above < _MIN_Z * floor.held_out**2 * (2.0 / pieces) ** 0.5:
         return []
     return [
         f"The test records ({listed([trial.name for trial in split.final])}) are predicted with an error of"
@@ -37,7 +37,7 @@ def repeats_apart(floor: Floor) -> list[str]:
     """A warning if residuals of repeats differ far more than the noise, which happens when repeats measured alike are
     predicted differently: the difference is taken for noise and hides what is missing."""
     most = max(floor.fitted, floor.held_out)
-    if not most > _APART:
+    if not most > _MAX_REPEAT_RATIO:
         return []
     return [
         f"Residuals of repeats differ by {most:.3g} times the noise, and what repeats differ by is taken for noise: was"
@@ -45,7 +45,7 @@ def repeats_apart(floor: Floor) -> list[str]:
     ]
 
 
-def but_too_little(choice: Choice, split: Split, tested: float | None, policy: Policy) -> list[str]:
+def explains_too_little(choice: Choice, split: Split, tested: float | None, policy: Policy) -> list[str]:
     """A warning for effects that predict better and are still not named. `tested`: the share of the gap that they close
     on the final trials."""
     named = " and ".join(choice.candidate.effects)
@@ -90,7 +90,7 @@ def follow_in_words(followed: Sequence[Followed]) -> str:
     return f"{listed(each)} {'is' if len(each) == 1 else 'are'} between conditions"
 
 
-def followed_by_nothing(followed: Sequence[Followed]) -> list[str]:
+def unexplained_nuisances(followed: Sequence[Followed]) -> list[str]:
     """A warning if nuisances follow the condition and no effect explains it."""
     if not followed:
         return []
@@ -107,7 +107,7 @@ def warnings_of(fitted: Fit, split: Split) -> tuple[str, ...]:
     others = [trial for trial in split.not_fitted if trial.name not in known]
     held_out = evaluate_on(fitted, others) if others else None
     fits = [fitted, held_out] if held_out else [fitted]
-    return (*_failed(fits), *_parameters(fitted), *_strayed(fits))
+    return (*_failed(fits), *_parameters(fitted), *_far_nuisances(fits))
 
 
 def _failed(fits: list[Fit]) -> list[str]:
@@ -139,7 +139,7 @@ def _parameters(fitted: Fit) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _strayed(fits: list[Fit]) -> list[str]:
+def _far_nuisances(fits: list[Fit]) -> list[str]:
     """Warnings for nuisances far from their expected value, in single trials or on average."""
     runs: dict[str, list[NuisanceOfRun]] = {}
     for run in runs_of(fits):

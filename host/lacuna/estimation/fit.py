@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 
 from lacuna.estimation.graduated import solve_graduated
-from lacuna.estimation.noise import LOWER, SHARPENED, NoiseFloor, estimate_noise
+from lacuna.estimation.noise import MAX_REESTIMATES, REFIT_SHARE, NoiseFloor, estimate_noise
 from lacuna.estimation.problem import PLAIN, SOFT_LIMIT, Point, Problem
-from lacuna.estimation.solve import ENOUGH, RELATIVE, Solution, cost_of, solve
+from lacuna.estimation.solve import MIN_GAIN, REL_TOL, Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
 from lacuna.system import Channels, Record, System
 
-_MOST_AGAIN = 40  # iterations with another floor
+_MAX_REWEIGH_ITERATIONS = 40  # iterations with another floor
 
 _SAME_COST = 0.02  # relative: starts whose costs agree to within this found the same minimum
-_OPEN = 0.1  # scales: tolerance of a bound for a parameter that the data do not determine
-_FRUITFUL = 1e-3  # of the cost: a search that gains less is not followed by another
+_UNDETERMINED_SD = 0.1  # scales: tolerance of a bound for a parameter that the data do not determine
+_MIN_REL_GAIN = 1e-3  # of the cost: a search that gains less is not followed by another
 _CONVERGED = 4e-3  # the same for a reported RMS error, which is then known to a fifth of a per cent
 _CONVERGED_ITERATIONS, _ROUNDS = 20, 5
 _NUISANCE_ITERATIONS = 4
-_NONE = np.zeros(0)
+_NO_NUISANCES = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Fit:
         free = list(self.solution.free)
         values, scales = self.solution.point.values, self.structure.scales()[free]
         normal = self.solution.normal * np.outer(scales, scales)
-        known = np.eye(len(free)) / _OPEN**2  # decides for a parameter that the data leave open
+        known = np.eye(len(free)) / _UNDETERMINED_SD**2  # decides for a parameter that the data leave open
         covariance = np.linalg.inv(normal + known) * np.outer(scales, scales)
         variance = np.diag(covariance)
         from_below = variance.copy()
@@ -71,7 +71,7 @@ class Fit:
                 from_below[i] = variance[i] + variance[j] - 2.0 * covariance[i, j]
         lower, upper = (bound[free] for bound in self.structure.bounds(values))
         below, above = values[free] - lower, upper - values[free]
-        return (below**2 <= 2.0 * ENOUGH * from_below) | (above**2 <= 2.0 * ENOUGH * variance)
+        return (below**2 <= 2.0 * MIN_GAIN * from_below) | (above**2 <= 2.0 * MIN_GAIN * variance)
 
     def predictions(self) -> list[Channels]:
         """Predictions of every fitted trial."""
@@ -96,7 +96,7 @@ def fit(
     *,
     starts: Sequence[np.ndarray] = (),
     max_iterations: int = 20,
-    relative: float = RELATIVE,
+    relative: float = REL_TOL,
     graduated: bool = False,
 ) -> Fit:
     """Fit all parameters of `structure` from each of `starts` (vectors; default: its own start) and keep the best.
@@ -120,7 +120,7 @@ def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
 
 
 def refit_on(
-    fitted: Fit, trials: Sequence[Record], *, near: Sequence[Fit], max_iterations: int = 20, relative: float = RELATIVE
+    fitted: Fit, trials: Sequence[Record], *, near: Sequence[Fit], max_iterations: int = 20, relative: float = REL_TOL
 ) -> Fit:
     """Refit the structure to other trials, starting from the fitted values. `near`: fits that together contain the
     nuisances of all these trials."""
@@ -135,36 +135,38 @@ def converged(fitted: Fit) -> Fit:
     """Continue the fit by plain least squares to convergence, the state for which an RMS error is reported. Searches
     follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
     problem = fitted.problem.seen(PLAIN)
-    options: dict[str, Any] = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _FRUITFUL}
+    options: dict[str, Any] = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _MIN_REL_GAIN}
     solution = solve(problem, fitted.solution.point, **options)
     if not fitted.structure.sites:  # curves have many parameters, and their fits are not compared with others
-        solution = renewed(problem, solution, fruitful=_CONVERGED, **options)
+        solution = continue_search(problem, solution, min_gain=_CONVERGED, **options)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
-def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL, **options: Any) -> Solution:
-    """Continue from `solution` with further searches for as long as one gains the share `fruitful` of the cost.
+def continue_search(
+    problem: Problem, solution: Solution, *, min_gain: float = _MIN_REL_GAIN, **options: Any
+) -> Solution:
+    """Continue from `solution` with further searches for as long as one gains the share `min_gain` of the cost.
 
     Each round searches on with the nuisances as they are and, while that helps, also with the nuisances restarted at
     their means. If the model predicts a jump slightly early or late, a nuisance and a parameter of similar effect (a
     run's friction and the friction) hold each other in place until a search releases one of them.
     """
-    letting_go = any(problem.nuisances)
+    restart_nuisances = any(problem.nuisances)
     for _ in range(_ROUNDS):
         further = [] if solution.converged else [solve(problem, solution.point, **options)]
-        if letting_go:
+        if restart_nuisances:
             from_means = solve(problem, problem.start(solution.point.values), **options)
-            letting_go = from_means.cost < min((s.cost for s in further), default=solution.cost)
+            restart_nuisances = from_means.cost < min((s.cost for s in further), default=solution.cost)
             further.append(from_means)
         best = min(further, key=lambda s: s.cost, default=solution)
         gained = solution.cost - best.cost
         solution = min(solution, best, key=lambda s: s.cost)
-        if gained < fruitful * solution.cost:
+        if gained < min_gain * solution.cost:
             break
     return solution
 
 
-def at_its_misfit(fitted: Fit) -> Fit:
+def refit_at_misfit(fitted: Fit) -> Fit:
     """Refit with the floor of a channel raised to the RMS residual that the fit leaves there, if that exceeds
     `SOFT_LIMIT`: all samples of the channel are then badly predicted, and none should be discounted as an outlier."""
     squares: dict[tuple[str, str], list[np.ndarray]] = {}
@@ -173,12 +175,12 @@ def at_its_misfit(fitted: Fit) -> Fit:
             squares.setdefault((trial.experiment, channel), []).append(np.square(z[np.isfinite(z)]))
     left = {key: float(np.sqrt(np.mean(np.concatenate(each)))) for key, each in squares.items()}
     floor = fitted.problem.floor.raised({key: rms for key, rms in left.items() if rms > SOFT_LIMIT})
-    return fitted if floor == fitted.problem.floor else reweigh(fitted, floor, max_iterations=_MOST_AGAIN)
+    return fitted if floor == fitted.problem.floor else reweigh(fitted, floor, max_iterations=_MAX_REWEIGH_ITERATIONS)
 
 
-def released(fitted: Fit) -> Fit:
+def relax_priors(fitted: Fit) -> Fit:
     """Return the fit, its parameters unchanged, with relaxed priors on those with `Parameter.prior_from_trials`."""
-    problem = fitted.problem.with_prior(released=True)
+    problem = fitted.problem.with_prior(relax_priors=True)
     cost = cost_of(problem, fitted.solution.point)
     return Fit(problem, replace(fitted.solution, cost=cost), fitted.starts, fitted.starts_agreeing)
 
@@ -220,19 +222,19 @@ def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = Non
     `near` where it has them. Each trial is estimated once per fit. The cost covers these trials alone: the prior cost
     of the parameters is already counted in their own fit."""
     known, values = fitted.known_nuisances, fitted.solution.point.values
-    asked = fitted.problem.over([t for t in trials if t.name not in known])
-    if any(asked.nuisances):
-        begun = _by_name(near) if near else {}
-        point = asked.start(values, [begun.get(t.name, _NONE) for t in asked.trials])
+    unknown = fitted.problem.over([t for t in trials if t.name not in known])
+    if any(unknown.nuisances):
+        initial = _by_name(near) if near else {}
+        point = unknown.start(values, [initial.get(t.name, _NO_NUISANCES) for t in unknown.trials])
         # a run's nuisance may be far from its mean; only plain least squares converges from there
-        far = any(t.name not in begun for t in asked.trials)
-        for view in dict.fromkeys((PLAIN, asked.view) if far else (asked.view,)):
-            found = solve(asked.seen(view), point, free=(), max_iterations=_NUISANCE_ITERATIONS)
+        far = any(t.name not in initial for t in unknown.trials)
+        for view in dict.fromkeys((PLAIN, unknown.view) if far else (unknown.view,)):
+            found = solve(unknown.seen(view), point, free=(), max_iterations=_NUISANCE_ITERATIONS)
             point = found.point
-        known |= _by_name(Fit(asked, found, 1, 1))
+        known |= _by_name(Fit(unknown, found, 1, 1))
     # if all trials were just estimated, their residuals are still cached
-    problem = asked if len(asked.trials) == len(trials) else fitted.problem.over(trials)
-    point = Point(values, tuple(known.get(t.name, _NONE) for t in problem.trials))
+    problem = unknown if len(unknown.trials) == len(trials) else fitted.problem.over(trials)
+    point = Point(values, tuple(known.get(t.name, _NO_NUISANCES) for t in problem.trials))
     cost = cost_of(problem, point) - problem.structure_prior_cost(point)
     solution = Solution(point, cost, True, (), np.zeros((0, 0)), ())
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
@@ -250,10 +252,10 @@ def spread_starts(structure: Structure, around: np.ndarray, count: int, seed: in
     The size of an effect is drawn from the range of its start sizes, with either sign if the bounds allow it.
     """
     draw = np.random.default_rng(seed)
-    return [around, *(_drawn(structure, around, draw) for _ in range(count - 1))]
+    return [around, *(_random_start(structure, around, draw) for _ in range(count - 1))]
 
 
-def _drawn(structure: Structure, around: np.ndarray, draw: np.random.Generator) -> np.ndarray:
+def _random_start(structure: Structure, around: np.ndarray, draw: np.random.Generator) -> np.ndarray:
     values = around + 2 * structure.scales() * draw.standard_normal(len(around))
     for index, parameter in enumerate(structure.parameters):
         if parameter.plausible is not None:
@@ -267,7 +269,7 @@ def _drawn(structure: Structure, around: np.ndarray, draw: np.random.Generator) 
             size = effect.absent + sign * factor * (parameter.value - effect.absent)
             values[structure.names.index(name)] = size
     lower, upper = structure.bounds(values)
-    return structure.lifted(np.clip(values, lower, upper))
+    return structure.raise_to_limits(np.clip(values, lower, upper))
 
 
 def fit_base(system: System, trials: Sequence[Record]) -> Fit:
@@ -275,13 +277,13 @@ def fit_base(system: System, trials: Sequence[Record]) -> Fit:
     for as long as the floor falls: the first floor includes whatever else differs between runs."""
     floor = estimate_noise(system, trials)
     found = fit(Structure(system), trials, floor, max_iterations=30, graduated=True)
-    for _ in range(SHARPENED):
+    for _ in range(MAX_REESTIMATES):
         sharper = floor.lowered_by(estimate_noise(system, trials, found.residuals()))
         fallen, floor = sharper.share_of(floor), sharper
         problem = found.problem.over(trials, floor)
         solution = solve(problem, found.solution.point, max_iterations=10)
         found = Fit(problem, solution, found.starts, found.starts_agreeing)
-        if fallen >= LOWER:
+        if fallen >= REFIT_SHARE:
             break
     return found
 

@@ -19,11 +19,11 @@ from scipy.ndimage import median_filter
 from scipy.optimize import brentq
 
 from lacuna.check.numbers import fast_noise
-from lacuna.estimation.sampling import correlation_samples, evenly, sample_period
+from lacuna.estimation.sampling import correlation_samples, resample_evenly, sample_period
 from lacuna.system import Channels, Record, System, by_channel, groups_of_repeats
 
-LOWER = 0.9  # a new floor below this share of the old one changes the weights enough for another refit
-SHARPENED = 5  # re-estimates of a floor, at most
+REFIT_SHARE = 0.9  # a new floor below this share of the old one changes the weights enough for another refit
+MAX_REESTIMATES = 5  # re-estimates of a floor, at most
 # Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
 _SHIFT_NODES, _SHIFT_WEIGHTS = hermegauss(8)
 _SHIFT_WEIGHTS /= _SHIFT_WEIGHTS.sum()
@@ -31,8 +31,8 @@ _LONGEST_JITTER_S = 0.5
 _MOVING_SIGMAS = 6.0
 _WINDOW_S = 0.05
 _SAME_VALUE = 1e-9  # of a record's range: values closer than this are equal
-_RECUR = 0.9  # distinct values per sample, at most, in a record whose values recur
-_ON_THE_GRID = 1e-3  # of a rounding step: deviation from a multiple, at most
+_MAX_DISTINCT_SHARE = 0.9  # distinct values per sample, at most, in a record whose values recur
+_GRID_REL_TOL = 1e-3  # of a rounding step: deviation from a multiple, at most
 
 
 @dataclass(frozen=True)
@@ -144,13 +144,13 @@ def _from_pairs(
     if still.sum() < 20:
         still = known
     sd = np.sqrt(np.mean(everything[still] ** 2))
-    sd = max(sd, sensor, _smallest([trial for pair in pairs for trial in pair], channel))
+    sd = max(sd, sensor, _min_sd([trial for pair in pairs for trial in pair], channel))
     records = [(first.time_s, _smooth(first.channels[channel])) for first, _ in pairs]
     jitter_s = _jitter(records, differences, moving, sd)
     scaled = []
     for record, difference in zip(records, differences, strict=True):
         variance = sd**2 + (_shift_variance(*record, jitter_s, sd) if jitter_s else 0.0)
-        scaled.append(evenly(record[0], difference / np.sqrt(variance)))
+        scaled.append(resample_evenly(record[0], difference / np.sqrt(variance)))
     return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
 
 
@@ -160,7 +160,7 @@ def _of_fast_noise(
     """Floor without repeats or a declared correlation time, from the fast noise of `basis`: residuals, or the records
     themselves, which give an upper bound, since a record may itself vary fast."""
     sd = float(np.median([fast_noise(trial.time_s, basis[trial.name][channel]) for trial in members]))
-    return ChannelNoise(max(sd, sensor, _smallest(members, channel)), 0.0, 1.0, 0)
+    return ChannelNoise(max(sd, sensor, _min_sd(members, channel)), 0.0, 1.0, 0)
 
 
 def _of_correlated(
@@ -170,13 +170,13 @@ def _of_correlated(
     slower changes are not noise. `basis` is residuals, or the records, which give an upper bound."""
     changes, pieces = [], []
     for trial in members:
-        period, samples = sample_period(trial.time_s), evenly(trial.time_s, basis[trial.name][channel])
+        period, samples = sample_period(trial.time_s), resample_evenly(trial.time_s, basis[trial.name][channel])
         lag = min(max(1, round(correlated_s / period)), len(samples) // 2)
         kept = np.exp(-period / correlated_s)
         changes.append((samples[lag:] - samples[:-lag]) / np.sqrt(2.0 * (1.0 - kept**lag)))
         pieces.append((1.0 + kept) / (1.0 - kept))
     sd = float(1.4826 * np.nanmedian(np.abs(np.concatenate(changes))))
-    return ChannelNoise(max(sd, sensor, _smallest(members, channel)), 0.0, float(np.median(pieces)), 0)
+    return ChannelNoise(max(sd, sensor, _min_sd(members, channel)), 0.0, float(np.median(pieces)), 0)
 
 
 def _difference(first: Record, second: Record, channel: str, basis: Mapping[str, Channels]) -> np.ndarray:
@@ -244,7 +244,7 @@ def _smooth(samples: np.ndarray) -> np.ndarray:
     return median_filter(samples, size=3, mode="nearest")
 
 
-def _smallest(trials: Sequence[Record], channel: str) -> float:
+def _min_sd(trials: Sequence[Record], channel: str) -> float:
     """Lower bound of a floor: the rounding error, and 1e-4 of the channel's spread, so that noise-free records do not
     get infinite weights."""
     spread = max(float(np.nanstd(trial.channels[channel])) for trial in trials)
@@ -263,8 +263,8 @@ def _rounding_step(samples: np.ndarray) -> float:
         return 0.0
     step, written = _common_step(steps), _last_decimal(values)
     off_the_grid = np.abs(steps - np.round(steps / step) * step)
-    near = max(_ON_THE_GRID * step, written if written < step / 3.0 else 0.0)
-    recur = len(steps) + 1 < _RECUR * len(known) and bool((off_the_grid <= near).all())
+    near = max(_GRID_REL_TOL * step, written if written < step / 3.0 else 0.0)
+    recur = len(steps) + 1 < _MAX_DISTINCT_SHARE * len(known) and bool((off_the_grid <= near).all())
     if recur:
         return step
     return float(steps.min()) if np.mean(np.diff(known) == 0.0) > 0.5 else 0.0

@@ -20,11 +20,11 @@ from lacuna.system import Channels, Parameter, Record
 
 LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of finite differences, in scales of the parameter
 SOFT_LIMIT = 10.0  # standard deviations beyond which a residual counts less than its square
-_OWN_STARTS = 8  # initial values tried for a parameter with a separate value in every trial
-_REMEMBERED = 4  # points whose residuals are cached
-_WORTH_A_PACK = 3  # trials; fewer gain less from being simulated side by side than from a core each
+_OWN_STARTS = 8  # initial values tried for each of an effect's own parameters of a trial
+_CACHE_SIZE = 4  # points whose residuals are cached
+_MIN_PACK_SIZE = 3  # trials; fewer gain less from being simulated side by side than from a core each
 FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
-_MOST = 1e8  # standard deviations; predictions that diverge further are clipped here, since squares would overflow
+_MAX_DEVIATION = 1e8  # standard deviations; predictions that diverge further are clipped, or squares would overflow
 
 
 _threads: int | None = None
@@ -115,7 +115,7 @@ class Problem:
         # cached residuals by point, since a search often begins where the previous one ended
         self._recent: dict[tuple[Any, ...], list[np.ndarray]] = {}
         self.sizes = [len(w.keep) for w in self._weighing]  # samples of all channels of each trial
-        self._together = _side_by_side(self.trials, structure.system.at_once)
+        self._together = _pack_trials(self.trials, structure.system.at_once)
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickling, without the cached residuals."""
@@ -123,8 +123,8 @@ class Problem:
 
     def start(self, values: np.ndarray | None = None, known: Sequence[np.ndarray] | None = None) -> Point:
         """Return a point to start from: the structure's vector `values` (default: its start) with nuisances at their
-        means, or the leading ones of each trial as `known`. Parameters with a separate value in every trial start at
-        the best of a few values."""
+        means, or the leading ones of each trial as `known`. The effects' own parameters of a trial start at the best of
+        a few values."""
         start = self.structure.start() if values is None else np.asarray(values, float)
         nuisances = [np.array([p.value for p in ps]) for ps in self.nuisances]
         for mine, given in zip(nuisances, known or (), strict=False):
@@ -148,10 +148,10 @@ class Problem:
         other.view = view
         return other
 
-    def with_prior(self, *, released: bool = False, sizes: Mapping[str, float] | None = None) -> Problem:
+    def with_prior(self, *, relax_priors: bool = False, sizes: Mapping[str, float] | None = None) -> Problem:
         """Return the same problem with another prior (`Structure.prior_precision`)."""
         other = copy(self)
-        other._prior = self.structure.prior_precision(released, sizes)
+        other._prior = self.structure.prior_precision(relax_priors, sizes)
         return other
 
     def over(self, trials: Sequence[Record], floor: NoiseFloor | None = None) -> Problem:
@@ -162,13 +162,13 @@ class Problem:
 
     def predict_all(self, point: Point) -> list[Channels]:
         """Predictions of every trial; NaN where they diverge."""
-        return self._of_each(point, self._within_reach)
+        return self._of_each(point, self._mask_diverged)
 
-    def _within_reach(self, prediction: Channels, index: int) -> Channels:
+    def _mask_diverged(self, prediction: Channels, index: int) -> Channels:
         """Replace diverging samples by NaN: they are no predictions, and their squares may overflow."""
         trial = self.trials[index]
         with np.errstate(invalid="ignore"):
-            far = {c: np.abs(prediction[c]) > _MOST * self._spans[index][c] for c in trial.channels}
+            far = {c: np.abs(prediction[c]) > _MAX_DEVIATION * self._spans[index][c] for c in trial.channels}
         return {c: np.where(far[c], np.nan, prediction[c]) if far[c].any() else prediction[c] for c in trial.channels}
 
     def residuals(self, point: Point) -> list[np.ndarray]:
@@ -177,7 +177,7 @@ class Problem:
         if key not in self._recent:
             coarse = self.view.raised > 1.0
             found = self._of_each(point, lambda prediction, i: self._weigh([prediction], i)[0], coarse=coarse)
-            while len(self._recent) >= _REMEMBERED:
+            while len(self._recent) >= _CACHE_SIZE:
                 del self._recent[next(iter(self._recent))]
             self._recent[key] = found
         return self._recent[key]
@@ -245,8 +245,8 @@ class Problem:
                 sum(times_slope(parameters[j].name, values[j]) * by_parameter[j] for j in of) / nuisances[k]
                 for k, of in factors.items()
             ]
-            felt = [*moving, *(p + k for k in (*stepping, *factors))]
-            return Sensitivity.of(np.vstack([changes, *by_factor]), felt, p, len(nuisances))
+            active = [*moving, *(p + k for k in (*stepping, *factors))]
+            return Sensitivity.of(np.vstack([changes, *by_factor]), active, p, len(nuisances))
 
         return in_parallel(of_trial, range(len(self.trials)), self.sizes)
 
@@ -265,16 +265,16 @@ class Problem:
         """Changes of a trial's residuals, shape (len(moved), n), from `here` to each nearby point in `moved`; a point
         is the structure's values and the trial's nuisances."""
         predictions = self._simulate([here, *moved], index, coarse=coarse, alike=True)
-        first, weight = self._looked_at(self._deviations(predictions[:1], index), index)
+        first, weight = self._apply_view(self._deviations(predictions[:1], index), index)
         with np.errstate(over="ignore", invalid="ignore"):  # handled below
             changes = self._samples(predictions[1:], index)
             changes -= self._samples(predictions[:1], index)
             changes *= self._weighing[index].weight
         reach = np.maximum(changes.max(axis=1, initial=0.0), -changes.min(axis=1, initial=0.0))
-        away = np.flatnonzero(~(reach <= _MOST))  # failed or diverging
+        away = np.flatnonzero(~(reach <= _MAX_DEVIATION))  # failed or diverging
         changes[away] = 0.0  # replaced below; infinities would enter the sums
         if self.view.blur:
-            changes, _ = self._looked_at(changes, index)
+            changes, _ = self._apply_view(changes, index)
         # the compression is linear over a step as small as a derivative's
         changes *= weight / self.view.raised / np.hypot(1.0, first[0] / self.view.raised / self.view.soft_limit)
         if len(away):
@@ -329,11 +329,11 @@ class Problem:
 
     def _weigh(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Residuals of a trial, a row for each prediction."""
-        z, weight = self._looked_at(self._deviations(predictions, index), index)
+        z, weight = self._apply_view(self._deviations(predictions, index), index)
         limit = self.view.soft_limit * self.view.raised
         return np.arcsinh(z / limit) * (self.view.soft_limit * weight)
 
-    def _looked_at(self, z: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
+    def _apply_view(self, z: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the deviations as the view smooths them, and their weights. With blur, every channel is low-pass
         filtered on an even time grid and decimated accordingly."""
         weight, ends = self._weighing[index].thinning, self._weighing[index].ends
@@ -359,7 +359,7 @@ class Problem:
             z -= self._weighing[index].measured
             z *= self._weighing[index].weight
         z[~np.isfinite(z)] = FAILED
-        return np.clip(z, -_MOST, _MOST, out=z)
+        return np.clip(z, -_MAX_DEVIATION, _MAX_DEVIATION, out=z)
 
     def _samples(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Predicted values of the measured samples, one channel after the other, a row for each prediction."""
@@ -407,7 +407,7 @@ def _span(samples: np.ndarray, sd: np.ndarray) -> float:
     return float(max(np.nanmax(np.abs(samples)), np.max(sd))) if np.isfinite(samples).any() else np.inf
 
 
-def _side_by_side(trials: Sequence[Record], at_once: int) -> list[list[int]]:
+def _pack_trials(trials: Sequence[Record], at_once: int) -> list[list[int]]:
     """Group the indices of trials that are simulated together: up to `at_once` of one experiment, unless too few."""
     experiments: dict[str, list[int]] = {}
     for i, trial in enumerate(trials):
@@ -416,7 +416,7 @@ def _side_by_side(trials: Sequence[Record], at_once: int) -> list[list[int]]:
     for members in experiments.values():
         for k in range(0, len(members), at_once):
             pack = members[k : k + at_once]
-            packs += [pack] if len(pack) >= _WORTH_A_PACK else [[i] for i in pack]
+            packs += [pack] if len(pack) >= _MIN_PACK_SIZE else [[i] for i in pack]
     return packs
 
 

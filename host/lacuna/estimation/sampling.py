@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-_UNEVEN = 0.1  # of the median period: times whose steps differ by no more than this are even
+_EVEN_REL_TOL = 0.1  # of the median period: times whose steps differ by no more than this are even
 _NEGLIGIBLE = 0.05  # the sum of autocorrelations ends at the first one below this, since the rest is chance
 _OUTLIER = 5.0  # in units of the noise; clips samples, so that a single bad one cannot decide
-_MET = 0.01  # of the pairs at a lag in a trace without gaps; with fewer, the autocorrelation is unknown
+_MIN_PAIR_SHARE = 0.01  # of the pairs at a lag in a trace without gaps; with fewer, the autocorrelation is unknown
 
 
 class Grid(NamedTuple):
@@ -29,14 +29,14 @@ class Grid(NamedTuple):
 def even_grid(time_s: np.ndarray) -> Grid | None:
     """Return the even grid for `time_s`, or None if the times are even already."""
     steps = np.diff(time_s)
-    if len(steps) < 2 or np.ptp(steps) <= _UNEVEN * np.median(steps):
+    if len(steps) < 2 or np.ptp(steps) <= _EVEN_REL_TOL * np.median(steps):
         return None
     place = np.interp(np.linspace(time_s[0], time_s[-1], len(time_s)), time_s, np.arange(len(time_s)))
     before = np.minimum(place.astype(int), len(time_s) - 2)
     return Grid(before, place - before)
 
 
-def evenly(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+def resample_evenly(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Interpolate `values`, shape (n,), to even times; NaN next to missing samples."""
     grid = even_grid(time_s)
     return values if grid is None else grid.of(values)
@@ -57,18 +57,18 @@ def correlation_samples(traces: Sequence[np.ndarray]) -> float:
     """
     traces = [trace for trace in traces if np.isfinite(trace).any()]
     longest = max(1, min((len(t) for t in traces), default=0) // 4)
-    total, met, lags = np.zeros(longest + 1), np.zeros(longest + 1), np.arange(longest + 1)
+    total, pair_counts, lags = np.zeros(longest + 1), np.zeros(longest + 1), np.arange(longest + 1)
     whole = np.zeros(longest + 1)  # pairs at each lag if there were no gaps
     for trace in traces:
         known = np.isfinite(trace)
         clean = np.where(known, np.clip(trace, -_OUTLIER, _OUTLIER), 0.0)
         total += _products(clean, longest) / known.sum()
-        met += _products(known.astype(float), longest) / known.sum()
+        pair_counts += _products(known.astype(float), longest) / known.sum()
         whole += np.maximum(1.0 - lags / len(trace), 0.0)
     if total[0] <= 0:
         return 1.0
     correlation = total / total[0]
-    below = np.flatnonzero((met > _MET * whole) & (correlation * whole < _NEGLIGIBLE * met))
+    below = np.flatnonzero((pair_counts > _MIN_PAIR_SHARE * whole) & (correlation * whole < _NEGLIGIBLE * pair_counts))
     end = below[0] if len(below) else longest
     return float(max(1.0, 1 + 2 * correlation[1:end].sum()))
 

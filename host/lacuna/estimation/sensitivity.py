@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike
 class Sensitivity:
     """Derivatives of n residuals with respect to p parameters of the structure and the trial's own q nuisances.
 
-    `taken`, shape (m, n), holds the finite differences, a row for each of those of the p + q parameters that the
-    residuals depend on, listed in `felt`; a trial that isolates parameters depends on few of them. The corrections of
+    `differences`, shape (m, n), holds the finite differences, a row for each of those of the p + q parameters that the
+    residuals depend on, listed in `active`; a trial that isolates parameters depends on few of them. The corrections of
     the k steps since are added as the product of `left`, shape (k, n), and `right`, shape (k, p + q). `gram`, shape
     (p + q, p + q), is the Gram matrix of the sum, kept up to date because n is large. `structure` is p.
     """
 
-    taken: np.ndarray
-    felt: np.ndarray
+    differences: np.ndarray
+    active: np.ndarray
     gram: np.ndarray
     left: np.ndarray
     right: np.ndarray
@@ -31,46 +31,46 @@ class Sensitivity:
         return self.gram.shape[0] - self.structure
 
     @classmethod
-    def of(cls, taken: np.ndarray, felt: ArrayLike, structure: int, nuisances: int) -> Sensitivity:
+    def of(cls, differences: np.ndarray, active: ArrayLike, structure: int, nuisances: int) -> Sensitivity:
         """Derivatives from finite differences, without corrections."""
-        size, felt = structure + nuisances, np.asarray(felt, int)
+        size, active = structure + nuisances, np.asarray(active, int)
         gram = np.zeros((size, size))
-        gram[np.ix_(felt, felt)] = taken @ taken.T
-        return cls(taken, felt, gram, np.zeros((0, taken.shape[1])), np.zeros((0, size)), structure)
+        gram[np.ix_(active, active)] = differences @ differences.T
+        return cls(differences, active, gram, np.zeros((0, differences.shape[1])), np.zeros((0, size)), structure)
 
     def gradient(self, residuals: np.ndarray) -> np.ndarray:
         """Transposed derivatives times `residuals`: the gradient of half their sum of squares, shape (p + q,)."""
         found = (self.left @ residuals) @ self.right
-        found[self.felt] += self.taken @ residuals
+        found[self.active] += self.differences @ residuals
         return found
 
     def times(self, step: np.ndarray) -> np.ndarray:
         """Predicted change of the residuals by a step, shape (n,)."""
-        return step[self.felt] @ self.taken + (self.right @ step) @ self.left
+        return step[self.active] @ self.differences + (self.right @ step) @ self.left
 
     def corrected(self, step: np.ndarray, scale: np.ndarray, change: np.ndarray) -> Sensitivity:
         """Return the derivatives with the smallest correction, in units of `scale`, that makes them reproduce the
         observed `change` (Broyden's update). Parameters that the residuals do not depend on stay without effect."""
-        felt = np.where(np.diag(self.gram) > 0.0, step / scale**2, 0.0)
-        length = float(felt @ step)
+        active = np.where(np.diag(self.gram) > 0.0, step / scale**2, 0.0)
+        length = float(active @ step)
         if length == 0.0:
             return self
         missed = (change - self.times(step)) / length
-        cross = np.outer(self.gradient(missed), felt)
-        gram = self.gram + cross + cross.T + float(missed @ missed) * np.outer(felt, felt)
-        return replace(self, gram=gram, left=np.vstack([self.left, missed]), right=np.vstack([self.right, felt]))
+        cross = np.outer(self.gradient(missed), active)
+        gram = self.gram + cross + cross.T + float(missed @ missed) * np.outer(active, active)
+        return replace(self, gram=gram, left=np.vstack([self.left, missed]), right=np.vstack([self.right, active]))
 
     def reweighed(self, factors: np.ndarray) -> Sensitivity:
         """Multiply the derivatives of every residual by its own factor; `factors` has shape (n,)."""
-        return self.of(self._rows * factors, self.felt, self.structure, self.nuisances)
+        return self.of(self._rows * factors, self.active, self.structure, self.nuisances)
 
     def dense(self) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives with respect to the structure's parameters, shape (n, p), and the nuisances, shape (n, q)."""
-        whole = np.zeros((self.gram.shape[0], self.taken.shape[1]))
-        whole[self.felt] = self._rows
+        whole = np.zeros((self.gram.shape[0], self.differences.shape[1]))
+        whole[self.active] = self._rows
         return whole[: self.structure].T, whole[self.structure :].T
 
     @property
     def _rows(self) -> np.ndarray:
-        """`taken` with the corrections of the steps since."""
-        return self.taken + self.right[:, self.felt].T @ self.left if len(self.left) else self.taken
+        """`differences` with the corrections of the steps since."""
+        return self.differences + self.right[:, self.active].T @ self.left if len(self.left) else self.differences

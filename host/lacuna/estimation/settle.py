@@ -22,11 +22,11 @@ from lacuna.estimation.solve import Solution, one_thread, solve
 
 _ROUNDS = 6
 _STEPS = 20  # per round; cheap compared with its derivatives
-_ENOUGH = 1.0  # log-likelihood: after a round that gains less, derivatives from its beginning still hold
+_MIN_GAIN = 1.0  # log-likelihood: after a round that gains less, derivatives from its beginning still hold
 # Squared change of the residuals over the expected one. Below: the step was too short, and its derivative is mostly
 # error. Above: it met a jump (a foot that slips a sample sooner).
-_PREDICTED = (0.5, 4.0)
-_LONGEST = 1.0  # scales: longest step of a derivative, in directions that the data leave open
+_CHANGE_RATIOS = (0.5, 4.0)
+_MAX_STEP_SCALES = 1.0  # scales: longest step of a derivative, in directions that the data leave open
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ def settle(fitted: Fit) -> Fit:
         options: dict[str, Any] = {"free": solution.free, "sensitivities": taken, "relative": 0.0}
         here = solve(problem, solution.point, max_iterations=0, **options)
         ahead = solve(problem, solution.point, max_iterations=_STEPS, **options)
-        trusted = _as_predicted(along, solution.normal, here.normal)
-        converged = trusted and here.cost - ahead.cost < _ENOUGH
+        trusted = _is_as_predicted(along, solution.normal, here.normal)
+        converged = trusted and here.cost - ahead.cost < _MIN_GAIN
         # derivatives corrected by the steps would reintroduce the simulation error
         fitted = replace(fitted, solution=replace(here, point=ahead.point, cost=ahead.cost, converged=converged))
         if converged:
@@ -71,8 +71,8 @@ def _directions(problem: Problem, solution: Solution) -> _Directions:
     values, vectors = np.linalg.eigh(solution.normal / np.outer(size, size))
     structure = vectors / np.sqrt(np.maximum(values, 1e-15)) / size[:, None]
     scales = problem.structure.scales()[list(solution.free)]
-    structure /= np.maximum(1.0, np.abs(structure / scales[:, None]).max(axis=0) / _LONGEST)
-    structure *= _room(problem, solution, structure)
+    structure /= np.maximum(1.0, np.abs(structure / scales[:, None]).max(axis=0) / _MAX_STEP_SCALES)
+    structure *= _step_factors(problem, solution, structure)
     following, spread = [], []
     for one, parameters in zip(solution.sensitivities, problem.nuisances, strict=True):
         p = one.structure
@@ -82,7 +82,7 @@ def _directions(problem: Problem, solution: Solution) -> _Directions:
     return _Directions(structure, tuple(following), tuple(spread))
 
 
-def _room(problem: Problem, solution: Solution, directions: np.ndarray) -> np.ndarray:
+def _step_factors(problem: Problem, solution: Solution, directions: np.ndarray) -> np.ndarray:
     """Factor for each direction, -1 to 1, that keeps its step within the bounds; negative if there is more room the
     other way."""
     free = list(solution.free)
@@ -97,11 +97,11 @@ def _room(problem: Problem, solution: Solution, directions: np.ndarray) -> np.nd
     return np.where(ahead >= back, ahead, -back)
 
 
-def _as_predicted(along: _Directions, before: np.ndarray, after: np.ndarray) -> bool:
+def _is_as_predicted(along: _Directions, before: np.ndarray, after: np.ndarray) -> bool:
     """Whether steps along the directions changed the residuals about as much as expected."""
     meant, seen = (np.einsum("pk,pq,qk->k", along.structure, normal, along.structure) for normal in (before, after))
     whole = meant > 0.5  # others were cut short, because the data leave them open
-    return bool(((seen > _PREDICTED[0] * meant) & (seen < _PREDICTED[1] * meant))[whole].all())
+    return bool(((seen > _CHANGE_RATIOS[0] * meant) & (seen < _CHANGE_RATIOS[1] * meant))[whole].all())
 
 
 def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _Directions) -> list[Sensitivity]:

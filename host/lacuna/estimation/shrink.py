@@ -18,8 +18,8 @@ from lacuna.estimation.structure import knot_name
 from lacuna.estimation.uncertainty import uncertainty
 
 _UPDATES = 100
-_NONE = 1e-3  # scales of a site: smallest size, that of a curve that is only noise
-_TOLD = 0.5  # of a knot's prior variance: the data determine a knot if its posterior variance is smaller
+_MIN_SIZE = 1e-3  # scales of a site: smallest size, that of a curve that is only noise
+_MAX_VARIANCE_SHARE = 0.5  # of a knot's prior variance: the data determine a knot if its posterior variance is smaller
 
 
 def shrunk(fitted: Fit) -> Fit:
@@ -34,8 +34,8 @@ def shrunk(fitted: Fit) -> Fit:
         knots = [knot_name(site, row, knot) for row in range(len(site.rows)) for knot in range(site.knots)]
         places = np.array([structure.names.index(knot) for knot in knots])
         own = np.array([solution.free.index(place) for place in places])
-        sizes[name], told = likeliest_size(values[places], known[np.ix_(own, own)], _NONE * site.scale)
-        values[places[~told]] = 0.0
+        sizes[name], determined = likeliest_size(values[places], known[np.ix_(own, own)], _MIN_SIZE * site.scale)
+        values[places[~determined]] = 0.0
     problem, begin = fitted.problem.with_prior(sizes=sizes), replace(solution.point, values=values)
     solution = solve(problem, begin, free=solution.free, sensitivities=solution.sensitivities)
     return replace(fitted, problem=problem, solution=solution)
@@ -48,7 +48,7 @@ def likeliest_size(values: np.ndarray, covariance: np.ndarray, least: float) -> 
     variances, along = np.maximum(variances, 0.0), (ways.T @ values) ** 2
     square = max(float(np.mean(values**2)), least**2)
     for _ in range(_UPDATES):
-        told = square / (variances + square)
-        square = max(float(along @ told**2 / told.sum()), least**2)
+        determined = square / (variances + square)
+        square = max(float(along @ determined**2 / determined.sum()), least**2)
     after = ways**2 @ (variances * square / (variances + square))
-    return float(np.sqrt(square)), after < _TOLD * square
+    return float(np.sqrt(square)), after < _MAX_VARIANCE_SHARE * square

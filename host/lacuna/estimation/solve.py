@@ -24,17 +24,17 @@ def one_thread(function: _Function) -> _Function:
     return alone
 
 
-ENOUGH = 0.02  # log-likelihood: a step with a smaller predicted gain is not taken
-RELATIVE = 2e-5  # the same relative to the cost, since far above the floor less accuracy is needed
+MIN_GAIN = 0.02  # log-likelihood: a step with a smaller predicted gain is not taken
+REL_TOL = 2e-5  # the same relative to the cost, since far above the floor less accuracy is needed
 # Bounds of a nuisance, in standard deviations from its mean. Wide, since its prior holds it and a tighter bound would
 # constrain the parameters as well; narrower if nothing else is free, or it would stand in for what the model lacks.
-_STRAY_SDS = 10.0
-_ALONE_SDS = 4.0
-_REACH = 50.0  # scales that a parameter may move in one step, beyond which its derivatives mean nothing
+_NUISANCE_SDS = 10.0
+_NUISANCE_SDS_ALONE = 4.0
+_MAX_STEP_SCALES = 50.0  # scales that a parameter may move in one step, beyond which its derivatives mean nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
-_TRUSTED = 0.25  # actual over predicted gain of a step below which derivatives are recomputed
-_PREDICTED = 0.5  # the same, above which a small step ends the search even with old derivatives
-_OLDEST = 8  # steps after which derivatives are recomputed in any case
+_MIN_GAIN_RATIO = 0.25  # actual over predicted gain of a step below which derivatives are recomputed
+_CONVERGED_GAIN_RATIO = 0.5  # the same, above which a small step ends the search even with old derivatives
+_MAX_AGE = 8  # steps after which derivatives are recomputed in any case
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def solve(
     free: Sequence[int] | None = None,
     max_iterations: int = 20,
     sensitivities: Sequence[Sensitivity] | None = None,
-    relative: float = RELATIVE,
+    relative: float = REL_TOL,
 ) -> Solution:
     """Minimise the cost from `start` over the parameters `free` (indices; default: all) and all nuisances.
 
@@ -79,7 +79,7 @@ def solve(
     """
     free = tuple(range(len(problem.structure.names)) if free is None else free)
     lower, upper, _ = _limits(problem, start, free)
-    here = _Place.at(problem, start, free, np.clip(_pack(start, free), lower, upper))
+    here = _State.at(problem, start, free, np.clip(_pack(start, free), lower, upper))
     scale = _limits(problem, here.point, free)[2]
     keep, steps = sensitivities is not None, problem.first_steps()
     if sensitivities is None:
@@ -87,20 +87,20 @@ def solve(
     damping, converged = _LAMBDA_START, False
     age = 0  # steps since the derivatives were computed
     for _ in range(max_iterations):
-        there, kept, damping, little = _descended(
+        there, kept, damping, negligible = _descend(
             problem, here, free, sensitivities, damping, relative, once=age > 0 and not keep
         )
         if there:
-            enough = here.cost - there.cost < max(ENOUGH, relative * there.cost)
+            enough = here.cost - there.cost < max(MIN_GAIN, relative * there.cost)
             before, here = here, there
-            if keep or (kept > _TRUSTED and age < _OLDEST and not enough):
+            if keep or (kept > _MIN_GAIN_RATIO and age < _MAX_AGE and not enough):
                 sensitivities, age = _corrected(sensitivities, before, here, scale, len(free)), age + 1
                 continue
-            if enough and (age == 0 or kept > _PREDICTED):
+            if enough and (age == 0 or kept > _CONVERGED_GAIN_RATIO):
                 converged = True
                 break
         elif age == 0:
-            converged = little
+            converged = negligible
             break
         if keep:
             break
@@ -111,7 +111,7 @@ def solve(
 
 
 @dataclass(frozen=True)
-class _Place:
+class _State:
     """Current state of a search: the point, also as one vector `x`, with its residuals and cost."""
 
     point: Point
@@ -120,55 +120,55 @@ class _Place:
     cost: float
 
     @classmethod
-    def at(cls, problem: Problem, old: Point, free: tuple[int, ...], x: np.ndarray) -> _Place:
+    def at(cls, problem: Problem, old: Point, free: tuple[int, ...], x: np.ndarray) -> _State:
         """Evaluate the point `x`; parameters that are not free keep their values in `old`, and ordered parameters
         (`Parameter.at_least`) are raised to their limits."""
         values = old.values.copy()
         values[list(free)] = x[: len(free)]
-        nuisances = tuple(x[own] for own in _own_places(map(len, old.nuisances), len(free)))
-        point = Point(problem.structure.lifted(values), nuisances)
+        nuisances = tuple(x[own] for own in _nuisance_slices(map(len, old.nuisances), len(free)))
+        point = Point(problem.structure.raise_to_limits(values), nuisances)
         return cls(point, _pack(point, free), problem.residuals(point), cost_of(problem, point))
 
 
-def _descended(
+def _descend(
     problem: Problem,
-    here: _Place,
+    here: _State,
     free: tuple[int, ...],
     sensitivities: Sequence[Sensitivity],
     damping: float,
     relative: float,
     *,
     once: bool,
-) -> tuple[_Place | None, float, float, bool]:
+) -> tuple[_State | None, float, float, bool]:
     """Find a step from `here` that lowers the cost, increasing the damping after every failure (`once`: a single try,
     for old derivatives). Returns the new place or None, the ratio of actual to predicted gain, the damping for the next
     step, and whether the predicted gain of the last step tried was too small to be worth taking."""
     system = _linearize(problem, here, free, sensitivities)
     lower, upper, scale = _limits(problem, here.point, free)
-    reach = _REACH * scale
+    reach = _MAX_STEP_SCALES * scale
     bounds = np.maximum(lower, here.x - reach), np.minimum(upper, here.x + reach)
-    least = max(ENOUGH, relative * here.cost)
-    promise, growth = np.inf, 8.0
+    least = max(MIN_GAIN, relative * here.cost)
+    predicted_gain, growth = np.inf, 8.0
     while damping < _LAMBDA_MOST:
-        step, promise = _step(*system, here.x, *bounds, scale, damping)
-        if promise < least:
+        step, predicted_gain = _step(*system, here.x, *bounds, scale, damping)
+        if predicted_gain < least:
             break
-        there = _Place.at(problem, here.point, free, here.x + step)
-        ratio = (here.cost - there.cost) / promise
+        there = _State.at(problem, here.point, free, here.x + step)
+        ratio = (here.cost - there.cost) / predicted_gain
         if there.cost < here.cost:
             damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))
             return there, ratio, damping, False
         damping, growth = max(damping, 1e-6) * growth, 2.0 * growth
         if once:
             break
-    return None, 0.0, damping, promise < least
+    return None, 0.0, damping, predicted_gain < least
 
 
 def _corrected(
-    sensitivities: Sequence[Sensitivity], before: _Place, after: _Place, scale: np.ndarray, p: int
+    sensitivities: Sequence[Sensitivity], before: _State, after: _State, scale: np.ndarray, p: int
 ) -> tuple[Sensitivity, ...]:
     found, step = [], after.x - before.x
-    places = _own_places((one.nuisances for one in sensitivities), p)
+    places = _nuisance_slices((one.nuisances for one in sensitivities), p)
     for one, own, old, new in zip(sensitivities, places, before.residuals, after.residuals, strict=True):
         moved, sizes = (np.concatenate([v[:p], v[own]]) for v in (step, scale))
         found.append(one.corrected(moved, sizes, new - old))
@@ -179,8 +179,8 @@ def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.n
     lower, upper = problem.structure.bounds(point.values)
     scale = problem.structure.scales()
     nuisances = [p for ps in problem.nuisances for p in ps]
-    sds = _STRAY_SDS if free else _ALONE_SDS
-    least, most = np.array([_may_be(p, sds) for p in nuisances]).reshape(-1, 2).T
+    sds = _NUISANCE_SDS if free else _NUISANCE_SDS_ALONE
+    least, most = np.array([_nuisance_range(p, sds) for p in nuisances]).reshape(-1, 2).T
     return (
         np.concatenate([lower[list(free)], least]),
         np.concatenate([upper[list(free)], most]),
@@ -188,7 +188,7 @@ def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.n
     )
 
 
-def _may_be(nuisance: Parameter, sds: float) -> tuple[float, float]:
+def _nuisance_range(nuisance: Parameter, sds: float) -> tuple[float, float]:
     """Range of a nuisance: `sds` standard deviations to either side of its mean, within its bounds."""
     if nuisance.periodic:
         return -np.inf, np.inf
@@ -200,13 +200,13 @@ def _pack(point: Point, free: tuple[int, ...]) -> np.ndarray:
     return np.concatenate([point.values[list(free)], *point.nuisances])
 
 
-def _own_places(counts: Iterable[int], p: int) -> list[slice]:
+def _nuisance_slices(counts: Iterable[int], p: int) -> list[slice]:
     """Slices of each trial's nuisances, `counts` of them, in a vector that begins with the p free parameters."""
     return [slice(begin, end) for begin, end in pairwise(accumulate(counts, initial=p))]
 
 
 def _linearize(
-    problem: Problem, here: _Place, free: tuple[int, ...], sensitivities: Sequence[Sensitivity]
+    problem: Problem, here: _State, free: tuple[int, ...], sensitivities: Sequence[Sensitivity]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and gradient of the Gauss-Newton system: free parameters first, then each trial's nuisances."""
     point, p = here.point, len(free)
@@ -216,7 +216,7 @@ def _linearize(
     normal[:p, :p] = prior[np.ix_(free, free)]
     gradient[:p] = (prior @ problem.prior_shift(point))[list(free)]
     gradients = in_parallel(lambda pair: pair[1].gradient(pair[0]), zip(here.residuals, sensitivities, strict=True))
-    places = _own_places(map(len, point.nuisances), p)
+    places = _nuisance_slices(map(len, point.nuisances), p)
     for one, own, change, nuisance, parameters in zip(
         sensitivities, places, gradients, point.nuisances, problem.nuisances, strict=True
     ):

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from lacuna.system import LEARNT, Correction, CorrectionSite, Parameter, Record, System, Theta
 
-_RELEASED = 20.0  # widens a relaxed prior: it hardly counts, but still holds what the data do not determine
-_TABLE_INTERVALS = 64  # of a tabulated curve, at least
+_RELAXED_FACTOR = 20.0  # widens a relaxed prior: it hardly counts, but still holds what the data do not determine
+_TABLE_INTERVALS = 64  # of a tabulated curve, about
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,14 @@ class Structure:
             lower[index] = max(lower[index], values[floor])
         return lower, upper
 
-    def lifted(self, values: np.ndarray) -> np.ndarray:
+    def raise_to_limits(self, values: np.ndarray) -> np.ndarray:
         """Return `values` with ordered parameters raised to their limits (`Parameter.at_least`)."""
         values = values.copy()
         for index, floor in self.ordered:
             values[index] = max(values[index], values[floor])
         return values
 
-    def parted(self, values: np.ndarray, effect: str) -> np.ndarray:
+    def separate_ordered(self, values: np.ndarray, effect: str) -> np.ndarray:
         """Return `values` with the parameters in `Effect.apart` raised to at least half their initial distance above
         their limits (`Parameter.at_least`)."""
         values, start = values.copy(), self.start()
@@ -108,14 +108,14 @@ class Structure:
         """Return the learnt curves, interpolated from their knots onto a uniform table by a natural cubic spline."""
         return tuple(_tabulate(self.system.correction_sites[name], theta) for name in self.sites)
 
-    def prior_precision(self, released: bool = False, sizes: Mapping[str, float] | None = None) -> np.ndarray:
+    def prior_precision(self, relax_priors: bool = False, sizes: Mapping[str, float] | None = None) -> np.ndarray:
         """Precision of the prior around the initial values, shape (P, P).
 
         It holds the declared priors, and for learnt curves knots within 10 scales of zero (or within the site's entry
-        in `sizes`) and second differences within 3 scales. `released` relaxes priors that were estimated from the
+        in `sizes`) and second differences within 3 scales. `relax_priors` relaxes priors that were estimated from the
         trials themselves, so that these do not count twice.
         """
-        wider = [_RELEASED if released and p.prior_from_trials else 1.0 for p in self.parameters]
+        wider = [_RELAXED_FACTOR if relax_priors and p.prior_from_trials else 1.0 for p in self.parameters]
         sds = zip((p.prior_sd for p in self.parameters), wider, strict=True)
         precision = np.diag([(sd * factor) ** -2.0 if sd else 0.0 for sd, factor in sds])
         for name in self.sites:

@@ -23,9 +23,9 @@ from lacuna.system import Record
 
 CONFIDENCE = 0.9  # of every interval
 _UNDETERMINED = 3.0  # scales: a direction with a larger standard deviation is not determined
-_REFITTED = 8  # iterations of the other parameters at each step of a profile
-_KNOWN = 1e-9  # of the best determined direction's information; less is rounding error
-_LEFT = 0.1  # of a direction's information that is taken to remain at least, since first order fails below it
+_PROFILE_ITERATIONS = 8  # iterations of the other parameters at each step of a profile
+_MIN_INFORMATION = 1e-9  # of the best determined direction's information; less is rounding error
+_MIN_REMAINING = 0.1  # of a direction's information that is taken to remain at least, since first order fails below it
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def _walk_out(fitted: Fit, index: int, others: tuple[int, ...], stride: float, b
         ahead = min(ahead, bound) if stride > 0 else max(ahead, bound)
         moved = point.values.copy()
         moved[index] = ahead
-        solution = solve(fitted.problem, Point(moved, point.nuisances), free=others, max_iterations=_REFITTED)
+        solution = solve(fitted.problem, Point(moved, point.nuisances), free=others, max_iterations=_PROFILE_ITERATIONS)
         next_rise = max(solution.cost - fitted.cost, rise + 1e-12)
         if next_rise >= limit:
             share = (np.sqrt(limit) - np.sqrt(rise)) / (np.sqrt(next_rise) - np.sqrt(rise))
@@ -157,7 +157,7 @@ def clustered_covariance(fit: Fit) -> np.ndarray:
     units = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
     scores: dict[object, np.ndarray] = {}
     normals: dict[object, np.ndarray] = {}
-    for trial, score, normal in zip(fit.problem.trials, *_evidence(fit), strict=True):
+    for trial, score, normal in zip(fit.problem.trials, *_scores_and_information(fit), strict=True):
         key = (trial.experiment, trial.condition)
         scores[key] = scores.get(key, 0.0) + score / units
         normals[key] = normals.get(key, 0.0) + normal / np.outer(units, units)
@@ -165,19 +165,19 @@ def clustered_covariance(fit: Fit) -> np.ndarray:
     if clusters < 2:
         return np.zeros_like(solution.normal)
     values, vectors = np.linalg.eigh(solution.normal / np.outer(units, units))
-    kept = values > _KNOWN * values.max()
+    kept = values > _MIN_INFORMATION * values.max()
     root = vectors[:, kept] / np.sqrt(values[kept])  # of the covariance; whitens the parameters
-    moves = np.array([root @ _moved(root.T @ normals[key] @ root, root.T @ scores[key]) for key in scores])
+    moves = np.array([root @ _optimum_shift(root.T @ normals[key] @ root, root.T @ scores[key]) for key in scores])
     return (clusters - 1) / clusters * moves.T @ moves / np.outer(units, units)
 
 
-def _moved(share: np.ndarray, score: np.ndarray) -> np.ndarray:
+def _optimum_shift(share: np.ndarray, score: np.ndarray) -> np.ndarray:
     """Shift of the optimum without a condition that contributes `share`, shape (P, P), of all information."""
     left, directions = np.linalg.eigh(np.eye(len(share)) - share)
-    return directions @ (directions.T @ score / np.maximum(left, _LEFT))
+    return directions @ (directions.T @ score / np.maximum(left, _MIN_REMAINING))
 
 
-def _evidence(fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _scores_and_information(fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Score, shape (P,), and information, shape (P, P), of each trial about the free parameters, with its own nuisances
     eliminated, so that these need only be close to their optimum."""
     problem, solution = fit.problem, fit.solution

@@ -44,7 +44,7 @@ def _evidence(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
         return []
     figure = both_palettes(partial(draw_weights, effects), "weight of each effect named")
     rows = [
-        (", ".join(filter(None, (_words(e["name"]), own_form(e)))), _sized(e), share_in_words(e["share_of_gap"]))
+        (", ".join(filter(None, (_words(e["name"]), own_form(e)))), _size_text(e), share_in_words(e["share_of_gap"]))
         for e in effects
     ]
     table = PageTable(("effect", "parameters, with 90 % intervals", "closes"), rows)
@@ -106,7 +106,7 @@ def _measured(found: Diagnosis) -> Section:
     return Section("What was measured", (floor_sentence(found),), (PageTable(columns, measured_rows(found)),))
 
 
-def _sized(effect: Mapping[str, Any]) -> str:
+def _size_text(effect: Mapping[str, Any]) -> str:
     said = []
     for name, value in effect["parameters"].items():
         size, lower, upper = (number_in_words(v, "g") for v in (value, *effect["interval_90"][name]))

@@ -115,7 +115,7 @@ def draw_learnt(curve: Mapping[str, Any], stream: BytesIO, dark: bool = False) -
 
 
 def _held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels, float]]:
-    """Held-out records (all records if there are none), worst predicted first: each with its worst channel, the
+    """Held-out records (fitted ones if there are none), worst predicted first: each with its worst channel, the
     predictions before and after, and the floor's standard deviation of that channel."""
     trials = diagnosis.split.final or diagnosis.split.known
     before, after = (evaluate_on(fit, trials).predictions() for fit in (diagnosis.base, diagnosis.final))

@@ -9,13 +9,13 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from bifa.campaign.again import ROUNDS, Ending, Trades, again, ending, judged, read_rounds
+from bifa.campaign.again import ROUNDS, Ending, RoundSteps, again, ending, judged, read_rounds
 from bifa.campaign.loop import gait_at_edge
 from bifa.campaign.stages import StageError
 from bifa.campaign.walks import planned_cycles
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait import SearchError
-from bifa.gait.settling import MOST_CYCLES
+from bifa.gait.settling import MAX_CYCLES
 from bifa.robot import Model, load_model, nominal, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 from bifa.simulate import walk
@@ -82,18 +82,18 @@ def walk_into(number, model, gait, folder, walks=walked):
 fall = partial(walk_into, walks=stood)
 
 
-def rounds_of(folders, first, trades, effects=()):
+def rounds_of(folders, first, steps, effects=()):
     """The rounds that again() writes, starting from the completed model `first`."""
     inputs, outputs = folders
     save_model(inputs / "model-completed.toml", first)
-    again(inputs, outputs, Dataset(None, "day", {}, ()), effects, trades)
+    again(inputs, outputs, Dataset(None, "day", {}, ()), effects, steps)
     return json.loads((outputs / "rounds.json").read_text())
 
 
 def go_round(folders, first, later):
     """The rounds if the diagnoses return the models `later` in turn, and the data that they saw; each finds FASTER."""
     complete, search = Mock(side_effect=[(model, ("hysteresis",)) for model in later]), Mock(return_value=FASTER)
-    rounds = rounds_of(folders, first, Trades(complete, search, walk_into))
+    rounds = rounds_of(folders, first, RoundSteps(complete, search, walk_into))
     begun = [walked for (_, walked), _ in search.call_args_list]
     assert begun == [(FASTER, FAST, *[FASTER] * number) for number in range(len(later))], "from all gaits walked"
     seen, asked = zip(*(call.args for call in complete.call_args_list), strict=True)
@@ -138,8 +138,8 @@ def test_it_ends_where_nothing_changes_any_more(folders):
 def test_a_model_that_names_something_is_not_given_up_for_one_that_names_nothing(folders):
     """Robot choked_flow, 800: with the walks added nothing was named, and the edge was sought for the base model."""
     search = Mock(return_value=FASTER)
-    trades = Trades(lambda dataset, suspected: (SLIPPERY, ()), search, walk_into)
-    rounds = rounds_of(folders, ROBOT, trades, ("hysteresis",))
+    steps = RoundSteps(lambda dataset, suspected: (SLIPPERY, ()), search, walk_into)
+    rounds = rounds_of(folders, ROBOT, steps, ("hysteresis",))
     assert [r["effects"] for r in rounds] == [["hysteresis"], ["hysteresis"]]
     assert search.call_args_list[0].args[0]["mu_k"] == pytest.approx(ROBOT["mu_k"])
     assert load_model(folders[1] / "model-last.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"])
@@ -148,7 +148,7 @@ def test_a_model_that_names_something_is_not_given_up_for_one_that_names_nothing
 def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
     """If the robot stands still with the gait at the edge, two cycles are fed back and the next gait is tried."""
     complete = Mock(return_value=(ROBOT, ()))
-    rounds = rounds_of(folders, ROBOT, Trades(complete, lambda model, walked: FASTER, fall))
+    rounds = rounds_of(folders, ROBOT, RoundSteps(complete, lambda model, walked: FASTER, fall))
     seen = [sorted({trial.file.split("/")[0] for trial in call.args[0].trials}) for call in complete.call_args_list]
     assert len(rounds) == ROUNDS
     assert seen == [["walks-1"], ["walks-1", "walks-2"]]
@@ -160,7 +160,7 @@ def test_a_gait_that_its_own_model_expects_to_fall_is_not_walked(folders):
     """Robot choked_flow, 906: a third diagnosis took an error of 0.8 % for a tether, and a gait with a probability of
     walking of 0.16 was walked; 20.3 mm/s became 6.4."""
     complete = Mock(side_effect=[(robot, ("hysteresis",)) for robot in (ROBOT, SLIPPERY)])
-    rounds = rounds_of(folders, SLIPPERY, Trades(complete, Mock(side_effect=[FASTER, None]), fall))
+    rounds = rounds_of(folders, SLIPPERY, RoundSteps(complete, Mock(side_effect=[FASTER, None]), fall))
     assert [(tuple(r["effects"]), r["ended"]) for r in rounds] == [((), None), (("hysteresis",), "falls")]
     assert load_model(folders[1] / "model-last.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"]), "that of the last walk"
     assert load_gait(folders[1] / "gait-last.toml") == FAST
@@ -171,8 +171,8 @@ def test_rounds_that_an_interrupted_run_has_walked_are_neither_sought_nor_walked
     rounds = folders[1] / "rounds"
     rounds.mkdir()
     write_dataset(rounds / "walks-2", walked({"round-2": FASTER}, 2))
-    trades = Trades(lambda dataset, suspected: (ROBOT, ()), lambda model, walked: None, fall)
-    assert [Gait(**one["gait"]) for one in rounds_of(folders, ROBOT, trades)] == [FAST, FASTER]
+    steps = RoundSteps(lambda dataset, suspected: (ROBOT, ()), lambda model, walked: None, fall)
+    assert [Gait(**one["gait"]) for one in rounds_of(folders, ROBOT, steps)] == [FAST, FASTER]
 
 
 @pytest.mark.parametrize(("probability", "gait"), [(0.97, FASTER), (0.16, None), (None, None)])
@@ -216,4 +216,4 @@ def test_rounds_of_an_earlier_version_are_walked_again(tmp_path):
 def test_a_robot_that_never_settles_is_given_all_cycles():
     tethered = ROBOT.with_effects({"tether_drag": {"drag_N_m": 0.5}})
     assert planned_cycles(ROBOT, BASELINE, 7) == 7
-    assert planned_cycles(tethered, BASELINE, 7) == MOST_CYCLES
+    assert planned_cycles(tethered, BASELINE, 7) == MAX_CYCLES

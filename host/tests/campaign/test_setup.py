@@ -14,7 +14,7 @@ from bifa.campaign.walks import walks_of
 from bifa.cli.campaign import kept_on_disk
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait import SearchError
-from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench, read_exports
+from bifa.measure.bench_file import QUESTIONS, BenchFileError, load_or_ask_known, read_bench, read_exports
 from bifa.measure.plan import BRISK, PlannedTrial
 from bifa.robot import nominal, save_model
 from bifa.robot.gait import BASELINE, load_gait, save_gait
@@ -28,17 +28,17 @@ def answering(*lines):
 def test_known_values_are_asked_once_and_kept(tmp_path):
     path = tmp_path / "bench.toml"
     desk = answering("0.182", "", "9 bar", "8.4", "")
-    known = known_on(path, desk)
+    known = load_or_ask_known(path, desk)
     assert known == {"head_mass_kg": 0.182, "supply_positive_psi": 8.4}
     assert any("supply_positive_psi must be a number, not '9 bar'" in call.args[0] for call in desk.say.call_args_list)
-    assert known_on(path, answering()) == known
-    assert len(ASKED) == 4
+    assert load_or_ask_known(path, answering()) == known
+    assert len(QUESTIONS) == 4
 
 
 def test_a_bench_that_has_only_declared_its_instruments_is_asked_and_keeps_them(tmp_path):
     path = tmp_path / "bench.toml"
     path.write_text('[instrument.machine]\npreset = "testxpert"\n')
-    assert known_on(path, answering("0.182", "", "", "")) == {"head_mass_kg": 0.182}
+    assert load_or_ask_known(path, answering("0.182", "", "", "")) == {"head_mass_kg": 0.182}
     assert read_bench(path) == {"head_mass_kg": 0.182}
     assert read_exports(path)["machine"].columns["force_N"] == "Standardkraft"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from bifa.check.lag import displacement_lag, misfit, misfit_of
+from bifa.check.lag import displacement_lag, misfit, trial_misfit
 from bifa.check.recordings import check_recordings
 from bifa.data import Dataset, Trial
 from virtual_robot.effects import EFFECTS, plant_parameters
@@ -69,8 +69,8 @@ def test_a_trial_that_does_not_fit_the_others_is_named_with_its_lag(session):
     assert found.file == wrong.file
     assert str(found).startswith(f"{wrong.file}: the displacement is ")
     assert "ms early relative to the pressures, but " in str(found)
-    assert misfit_of(late(wrong, -0.01), session[:-1]).startswith(f"{wrong.file}: the displacement is ")
-    assert misfit_of(wrong, session[:-1]) is None
+    assert trial_misfit(late(wrong, -0.01), session[:-1]).startswith(f"{wrong.file}: the displacement is ")
+    assert trial_misfit(wrong, session[:-1]) is None
 
 
 def test_a_shift_of_all_trials_is_one_finding(session):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bifa.data import Dataset, Trial
-from bifa.identify.scatter import of_few, session_drifts, shared_square, switch_timing
+from bifa.identify.scatter import sd_of_few, session_drifts, shared_square, switch_timing
 from bifa.robot import BASELINE, nominal
 from bifa.robot.model import Scatter
 from lacuna.system import Correction
@@ -43,6 +43,6 @@ def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():
 
 def test_few_gaits_tell_less_of_the_next_than_many():
     """After three gaits that were 1 % off, the next is within 2.35 % in nine of ten cases (Student's t of three)."""
-    assert 1.645 * of_few([1e-4] * 3) == pytest.approx(0.0235, rel=1e-2)
-    assert of_few([1e-4] * 1000) == pytest.approx(0.01, rel=1e-2)
-    assert of_few([-1e-6]) == of_few([]) == 0.0
+    assert 1.645 * sd_of_few([1e-4] * 3) == pytest.approx(0.0235, rel=1e-2)
+    assert sd_of_few([1e-4] * 1000) == pytest.approx(0.01, rel=1e-2)
+    assert sd_of_few([-1e-6]) == sd_of_few([]) == 0.0

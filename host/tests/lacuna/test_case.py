@@ -7,9 +7,9 @@ from toy import NOBODY, case_of, hide, moved
 from lacuna.diagnosis import case as case_module
 from lacuna.diagnosis import race as race_module
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.race import from_elsewhere
+from lacuna.diagnosis.race import refit_multi_start
 from lacuna.diagnosis.score import remaining_after, score
-from lacuna.diagnosis.search import led_out, search, with_derivatives
+from lacuna.diagnosis.search import escape_local_optimum, search, with_derivatives
 from lacuna.estimation.fit import Fit, fit, reweigh
 from lacuna.estimation.structure import Structure
 
@@ -44,22 +44,22 @@ def test_what_a_better_explanation_takes_away_matters_whatever_repeats_share(cas
     """An explanation dominates another only if it reduces the RMS residual by a relevant amount."""
     a_little, much = (case.judge(astray_by(right.fitted, by)) for by in (0.003, 0.3))
     monkeypatch.setattr(Case, "converged", lambda self, candidate: candidate.fitted)
-    assert not case.dominated(right, much)
-    assert not case.dominated(a_little, right)
-    assert case.dominated(much, right)
+    assert not case.is_dominated(right, much)
+    assert not case.is_dominated(a_little, right)
+    assert case.is_dominated(much, right)
 
 
 def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case, right):
     astray = case.judge(astray_by(right.fitted, 0.3))
     assert astray.cost > right.cost + 10.0
-    assert from_elsewhere(astray, case.split, 0, NOBODY).cost < right.cost + 1.0
+    assert refit_multi_start(astray, case.split, 0, NOBODY).cost < right.cost + 1.0
 
 
 def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case, right, monkeypatch):
     worse = astray_by(right.fitted, 0.1).solution
-    for name in ("solve_graduated", "solve", "renewed"):
+    for name in ("solve_graduated", "solve", "continue_search"):
         monkeypatch.setattr(race_module, name, lambda *_, **__: worse)
-    assert from_elsewhere(right, case.split, 0, NOBODY) is right
+    assert refit_multi_start(right, case.split, 0, NOBODY) is right
 
 
 def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case, right):
@@ -77,9 +77,9 @@ def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case
     floor = right.fitted.problem.floor
     delayed = case.judge(fit(Structure(case.system, ("delay",)), case.split.fit, floor))
     astray = case.judge(astray_by(right.fitted, 0.3))
-    assert led_out(astray, [delayed], case.split).cost < right.cost + 1.0
-    assert led_out(astray, [], case.split) is None
-    assert led_out(right, [delayed], case.split) is None
+    assert escape_local_optimum(astray, [delayed], case.split).cost < right.cost + 1.0
+    assert escape_local_optimum(astray, [], case.split) is None
+    assert escape_local_optimum(right, [delayed], case.split) is None
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.record import as_record
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.signature import describe
-from lacuna.diagnosis.warn import but_too_little, doubts
+from lacuna.diagnosis.warn import doubts, explains_too_little
 from lacuna.report.diagnosis import diagnosis_page
 from lacuna.report.page import render
 
@@ -62,12 +62,12 @@ def test_where_something_matters_it_is_told_where(found):
 
 def test_final_records_and_a_likelier_set_speak_against_a_verdict(found):
     assert doubts(found.choice, found.split, 0.9) == []
-    (little,) = but_too_little(found.choice, found.split, 0.3, POLICY)
+    (little,) = explains_too_little(found.choice, found.split, 0.3, POLICY)
     assert "by only 30 % of what is missing there: it is not named" in little
-    (harm,) = but_too_little(found.choice, found.split, -0.3, POLICY)
+    (harm,) = explains_too_little(found.choice, found.split, -0.3, POLICY)
     assert "With delay most records are predicted better, but the test records" in harm
     assert found.split.final[0].name in harm
-    assert "too little" in but_too_little(found.choice, found.split, None, POLICY)[0]
+    assert "too little" in explains_too_little(found.choice, found.split, None, POLICY)[0]
     likelier = replace(found.choice, weights=found.choice.weights | {("delay", "stiction"): 3.0})
     (odds,) = doubts(likelier, found.split, None)
     assert "With stiction added" in odds

@@ -170,7 +170,7 @@ class FadingBlock(Block):
 )
 def test_what_an_effect_needs_apart_begins_half_as_far_apart_as_at_the_start(held, sliding, begun):
     structure = Structure(FadingBlock(2.5, 2.0), ("fading",))
-    assert structure.parted(np.array([held, sliding, 0.1]), "fading") == pytest.approx([begun, sliding, 0.1])
+    assert structure.separate_ordered(np.array([held, sliding, 0.1]), "fading") == pytest.approx([begun, sliding, 0.1])
 
 
 def test_correlated_noise_counts_for_less():

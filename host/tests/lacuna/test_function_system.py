@@ -13,12 +13,12 @@ from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
-from lacuna.records import Table, segments, stretched
+from lacuna.records import Table, attach_run, segments
 from lacuna.run import with_records
 
 
 def test_what_a_loop_reads_of_an_effect_is_no_search_among_names():
-    found = heater.system().values({}).at_hand()
+    found = heater.system().values({}).with_attributes()
     assert vars(found)["gain_K_W"] == found["gain_K_W"] == 0.8
     assert vars(vars(found)["sensor_lag"])["lag_s"] == found.sensor_lag["lag_s"] == found["sensor_lag.lag_s"] == 0.0
     with pytest.raises(AttributeError, match="wire: there are gain_K_W"):
@@ -93,7 +93,7 @@ def test_the_completed_model_of_a_segment_gives_its_own_samples():
     noise = 0.01 * np.random.default_rng(0).standard_normal(400)
     pieces = segments(Table("long", time, {"y": 2.0 * time + 0.3 * time**2 + noise}, {}), 10)
     verdict = lacuna.diagnose(system, pieces, progress=False)
-    trial = stretched(pieces[5], pieces[5].record(["y"]), ["y"])
+    trial = attach_run(pieces[5], pieces[5].record(["y"]), ["y"])
     for asked in (pieces[5], trial):
         np.testing.assert_allclose(verdict.model(asked)["y"], pieces[5].columns["y"], atol=0.05)
 

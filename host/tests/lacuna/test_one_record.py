@@ -10,7 +10,7 @@ from toy import slow
 
 import lacuna
 from lacuna import Effect, Parameter
-from lacuna.misfit import compared_at_misfit
+from lacuna.misfit import compare_at_misfit
 from lacuna.records import RecordError
 from lacuna.run import with_records
 
@@ -159,7 +159,7 @@ def test_explanations_far_above_the_floor_are_compared_at_a_fraction_of_what_the
         return _found("identified", 0.04, raised[-1])
 
     first = _found("unexplained", 1.0, 0.001)
-    found, was = compared_at_misfit(heater.system(), first, again)
+    found, was = compare_at_misfit(heater.system(), first, again)
     assert raised == [0.05, 0.002]
     assert found.search.floor.channels["run", "y"].sd == 0.05
     assert was == {("run", "y"): 0.001}
@@ -171,12 +171,12 @@ def test_explanations_far_above_the_floor_are_compared_at_a_fraction_of_what_the
 def test_near_the_floor_or_without_a_gap_nothing_is_compared_again(verdict, left, floor):
     """A misfit of 21 floors would raise the floor by 5 % only, too little to change a comparison."""
     first = _found(verdict, left, floor)
-    assert compared_at_misfit(heater.system(), first, pytest.fail) == (first, {})
+    assert compare_at_misfit(heater.system(), first, pytest.fail) == (first, {})
 
 
 def test_where_a_raised_floor_hides_everything_the_first_answer_stands():
     first = _found("unexplained", 1.0, 0.001)
-    assert compared_at_misfit(heater.system(), first, lambda system: _found("none", 1.0, 0.05)) == (first, {})
+    assert compare_at_misfit(heater.system(), first, lambda system: _found("none", 1.0, 0.05)) == (first, {})
 
 
 @pytest.mark.parametrize(("cubic", "verdict"), [(0.3, "identified"), (0.0, "none")])

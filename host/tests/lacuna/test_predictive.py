@@ -10,7 +10,7 @@ from toy import NOBODY, case_of, moved
 
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.policy import POLICY
-from lacuna.diagnosis.race import COARSE, continued
+from lacuna.diagnosis.race import COARSE, add_each_effect
 from lacuna.diagnosis.residual_error import excess_over
 from lacuna.diagnosis.sizes import starts
 from lacuna.estimation.fit import fit, predictive
@@ -111,7 +111,7 @@ def test_an_effect_with_nothing_to_do_is_refitted_from_all_of_its_sizes():
     begun = starts(one, structure, "fading")
     assert len(begun) == 3
     assert all(theta["holding_N"] > theta["sliding_N"] for theta in map(structure.theta, begun))
-    (refitted,) = continued(one, ["fading"], NOBODY)
+    (refitted,) = add_each_effect(one, ["fading"], NOBODY)
     problem = refitted.problem
     alone = [solve(problem, problem.start(v, one.solution.point.nuisances), **COARSE).cost for v in begun]
     assert refitted.cost == min(alone)

@@ -14,7 +14,7 @@ from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.learn import learn_correction
 from lacuna.diagnosis.policy import POLICY
-from lacuna.diagnosis.race import cold, cold_starts, initial_guess, joined, race, to_the_end
+from lacuna.diagnosis.race import cold, cold_starts, fit_to_convergence, initial_guess, joined, race
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.search import search
 from lacuna.errors import MisuseError
@@ -173,7 +173,7 @@ def test_an_initial_guess_keeps_what_is_known_of_effects_and_curves_alone():
 def test_what_is_fitted_to_the_end_is_never_worse():
     case = bench({"delay.delay_s": 0.03}, 44)
     base = case.judge(case.fit_base(1))
-    assert to_the_end([base], case.split, NOBODY)[0].cost <= base.cost
+    assert fit_to_convergence([base], case.split, NOBODY)[0].cost <= base.cost
 
 
 def test_two_that_are_joined_are_as_they_are_in_each():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from toy import moved
 
-from lacuna.estimation.fit import fit, released
+from lacuna.estimation.fit import fit, relax_priors
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.settle import settle
@@ -187,7 +187,7 @@ def test_a_prior_from_the_trials_themselves_stands_back_where_parameters_are_tol
         told_before = replace(bent, value=TRUTH["bent"] + 2.0 * sd, prior_sd=sd, prior_from_trials=from_trials)
         system.parameters = (slope, told_before)
         found = fitted(system)
-        for one, errors in ((settle(found), pulled), (settle(released(found)), told)):
+        for one, errors in ((settle(found), pulled), (settle(relax_priors(found)), told)):
             errors.append((one.theta["bent"] - TRUTH["bent"]) / sd)
     assert np.mean(pulled) == pytest.approx(1.0, abs=0.35)
     assert np.mean(told) == pytest.approx(0.0 if from_trials else 1.0, abs=0.5)

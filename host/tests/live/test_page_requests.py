@@ -8,7 +8,7 @@ from concurrent.futures import Future
 import pytest
 from wsproto.events import BytesMessage, TextMessage
 
-from bifa.live.web.gate import LARGEST_MESSAGE, MOST_STRANGERS
+from bifa.live.web.gate import LARGEST_MESSAGE, MAX_STRANGERS
 from bifa.live.web.server import LivePage, served
 from bifa.robot import nominal
 from bifa.robot.gait import BASELINE
@@ -132,14 +132,14 @@ def test_a_page_from_elsewhere_is_not_heard(page, port, live, origin):
 def test_strangers_make_room_for_whoever_comes(port, page):
     owner = page()
     owner.state()
-    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MOST_STRANGERS)]
+    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MAX_STRANGERS)]
     try:
         begun_s = time.monotonic()
         assert posted(port, "stop") == 200
         assert time.monotonic() - begun_s < 4.0, "before the idle connections time out"
         assert owner.answer(owner.ask("stop"))["said"]
         gone = [one for one in idle if _is_closed(one)]
-        assert len(idle) - len(gone) <= MOST_STRANGERS
+        assert len(idle) - len(gone) <= MAX_STRANGERS
     finally:
         for one in idle:
             one.close()

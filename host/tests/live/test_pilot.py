@@ -8,7 +8,7 @@ from contextlib import nullcontext
 import pytest
 
 from bifa.link import PortGoneError, StillMovingError, Uno, frames
-from bifa.live.web.pilot import BusyError, NobodyThereError, Pilot
+from bifa.live.web.pilot import BusyError, NotConnectedError, Pilot
 from harness.board import Board
 
 
@@ -113,7 +113,7 @@ def test_what_the_uno_refuses_is_said_and_the_flight_goes_on():
 def test_afterwards_nothing_is_taken_any_more():
     pilot, _, board = flown(lambda pilot, report: None, begin=lambda uno: uno.run())
     assert board.valves == 0
-    with pytest.raises(NobodyThereError, match="ended"):
+    with pytest.raises(NotConnectedError, match="ended"):
         pilot.ask(lambda uno: uno.run()).result(0)
 
 

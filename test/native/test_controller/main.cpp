@@ -541,7 +541,7 @@ void test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them() {
       bench.tick();
       Sample sample;
       if (!bench.controller.take_sample(sample)) continue;
-      const bool strobed = bench.strobed;  // the round that this sample came from
+      const bool strobed = bench.strobed;  // in the round that this sample came from
       if (!strobed) ++left_out;
       if (strobed && left_out > 0 && first_after == 0) first_after = sample.sequence;
     }

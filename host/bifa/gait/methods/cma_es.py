@@ -12,16 +12,16 @@ from bifa.gait.space import folded
 from .common import Evaluated, Objective, OnEvaluated, RecordedObjective, agree
 
 _SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, doubled until enough walk
-_ENOUGH = 60
-APART = 0.12  # distance on some axis of the unit cube that puts two starts in different basins
+_MIN_WALKING = 60
+BASIN_SPACING = 0.12  # distance on some axis of the unit cube that puts two starts in different basins
 _NEIGHBORS, _COMPARED = 8, 2000
 POPULATION = 12  # points per run and generation
 _CLIMBS = 5  # runs side by side, at first and in each restart
 _STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations in the unit cube: in any basin, and near its top
-_TRIAL = 10  # generations after which a run far behind the best is abandoned
-_BEHIND = 0.9  # share of the best value below which a run is far behind
-_SAME = 2.5e-3  # relative difference within which the best two runs agree
-_STALLED, _GAIN = 10, 5e-4  # a run ends if it gains less than this fraction in so many generations
+_TRIAL_GENERATIONS = 10  # generations after which a run far behind the best is abandoned
+_ABANDON_RATIO = 0.9  # share of the best value below which a run is far behind
+_REL_TOL = 2.5e-3  # relative difference within which the best two runs agree
+_STALL_GENERATIONS, _MIN_GAIN = 10, 5e-4  # a run ends if it gains less than this fraction in so many generations
 
 
 def cma_es(
@@ -45,14 +45,14 @@ def climb_basins(
     seed: int,
     step: float = _STEP,
     known: Sequence[np.ndarray] = (),
-    behind: float = _BEHIND,
+    behind: float = _ABANDON_RATIO,
 ) -> Evaluated:
     """Run CMA-ES from points `known` to be near local optima and from the best recorded basins, until the best two runs
     agree, all basins were tried, or about `evaluations` are recorded. With `known` points every run is completed: two
     that agree early may be in one basin, and another may overtake both."""
-    same = 0.0 if len(known) else _SAME
+    same = 0.0 if len(known) else _REL_TOL
     ends, tried = Evaluated(np.empty((0, len(wraps))), np.empty(0)), list(known)
-    while recorder.count < evaluations and not agree(ends.values, _SAME):
+    while recorder.count < evaluations and not agree(ends.values, _REL_TOL):
         others = basins(recorder.found(), wraps, _CLIMBS - len(known), tried)
         starts = np.array([*known, *others])
         if not len(starts):
@@ -69,7 +69,7 @@ def _sample(recorder: RecordedObjective, dimensions: int, seed: int, evaluations
     sobol = qmc.Sobol(dimensions, rng=np.random.default_rng([seed, 2]))
     size = min(_SAMPLE, 1 << max(3, int(np.log2(max(evaluations, 16) / 2))))
     values = recorder(sobol.random(size))
-    while np.count_nonzero(values > 0.0) < _ENOUGH and 2 * len(values) <= min(_SAMPLE_MOST, evaluations / 2):
+    while np.count_nonzero(values > 0.0) < _MIN_WALKING and 2 * len(values) <= min(_SAMPLE_MOST, evaluations / 2):
         values = np.concatenate([values, recorder(sobol.random(len(values)))])
 
 
@@ -77,10 +77,10 @@ def basins(seen: Evaluated, wraps: np.ndarray, count: int, tried: Sequence[np.nd
     """Up to `count` starting points (m, dimensions) outside the basins `tried`: first the best of the points that no
     neighbour beats, each the top of its basin as far as known, then the best of the others."""
     tops = _tops(seen, wraps)
-    first = Evaluated(seen.points[tops], seen.values[tops]).finalists(count, APART, wraps, avoid=tried)
+    first = Evaluated(seen.points[tops], seen.values[tops]).finalists(count, BASIN_SPACING, wraps, avoid=tried)
     if len(first) >= count:
         return np.array(first)
-    return np.array([*first, *seen.finalists(count - len(first), APART, wraps, avoid=[*tried, *first])])
+    return np.array([*first, *seen.finalists(count - len(first), BASIN_SPACING, wraps, avoid=[*tried, *first])])
 
 
 def _tops(seen: Evaluated, wraps: np.ndarray) -> np.ndarray:
@@ -102,11 +102,11 @@ def climb_together(
     evaluations: int,
     seed: int,
     steps: Sequence[float],
-    behind: float = _BEHIND,
+    behind: float = _ABANDON_RATIO,
     same: float = 0.0,
 ) -> Evaluated:
     """Run CMA-ES from `starts` (n, dimensions), one generation of all runs per call; return the best point of each.
-    A run that after `_TRIAL` generations is below `behind` of the best is abandoned. If `same` is not 0, all runs stop
+    A run that after `_TRIAL_GENERATIONS` is below `behind` of the best is abandoned. If `same` is not 0, all runs stop
     once two that have ended agree within it and no running one is ahead."""
     tops = np.array(starts, dtype=float)
     runs = [_strategy(*start, seed + k) for k, start in enumerate(zip(starts, steps, strict=True))]
@@ -132,11 +132,11 @@ def climb_together(
 
 
 def _is_hopeless(bests: Sequence[float], least: float) -> bool:
-    return len(bests) >= _TRIAL and bests[-1] < least
+    return len(bests) >= _TRIAL_GENERATIONS and bests[-1] < least
 
 
 def _has_stalled(bests: Sequence[float]) -> bool:
-    return len(bests) > _STALLED and bests[-1] - bests[-1 - _STALLED] <= _GAIN * abs(bests[-1])
+    return len(bests) > _STALL_GENERATIONS and bests[-1] - bests[-1 - _STALL_GENERATIONS] <= _MIN_GAIN * abs(bests[-1])
 
 
 def _strategy(start: np.ndarray, step: float, seed: int) -> cma.CMAEvolutionStrategy:

@@ -1,4 +1,4 @@
-"""Successive flights: while somebody watches the page, wait for a disconnected robot to return, as `bifa record` does.
+"""Successive flights: while somebody watches the page, wait for a lost robot to return, as `bifa record` does.
 
 When it is back, it never walks by itself; whoever watches decides.
 """
@@ -28,7 +28,7 @@ def fly(
     say: prints on the terminal what has gone wrong. Raises the error that ended a flight if nobody watches the pages.
     """
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
-    begin, came_back, told = first, "", ""
+    begin, came_back, last_error = first, "", ""
     while (left_s := end_s - time.monotonic()) > 0:
         try:
             with board.open() as rig:
@@ -40,8 +40,8 @@ def fly(
         except GONE as error:
             if isinstance(error.__cause__, KeyboardInterrupt) or not pilot.is_watched():
                 raise
-            if str(error) != told:
-                told = str(error)
+            if str(error) != last_error:
+                last_error = str(error)
                 say(f"{error}\nwaiting for the Uno, since a page is open; it will not walk by itself (Ctrl-C ends)")
-            begin, came_back = later, "the Uno was disconnected and is back; it does not walk by itself"
+            begin, came_back = later, "the link to the Uno was lost and is back; it does not walk by itself"
             time.sleep(RETRY_S)

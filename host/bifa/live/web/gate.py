@@ -10,7 +10,7 @@ from typing import Any
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.wsproto_impl import WSProtocol
 
-MOST_STRANGERS = 32
+MAX_STRANGERS = 32
 HEADERS_WITHIN_S = 5.0
 ANSWERED_WITHIN_S = 20.0  # a request and its answer; websockets may stay longer
 LARGEST_HEADERS = 16 * 1024
@@ -36,7 +36,7 @@ class Gate:
         class Websocket(WSProtocol):
             def connection_made(websocket, transport: Any) -> None:  # noqa: N805
                 super().connection_made(transport)
-                self._watches(transport)
+                self._keep_open(transport)
 
             def connection_lost(websocket, error: Exception | None) -> None:  # noqa: N805
                 self._forget(websocket.transport)
@@ -50,7 +50,7 @@ class Gate:
             self._forget(transport)
 
     def _enter(self, http: H11Protocol) -> None:
-        while len(self.strangers) >= MOST_STRANGERS:
+        while len(self.strangers) >= MAX_STRANGERS:
             self._end(next(iter(self.strangers)))
         loop = asyncio.get_running_loop()
         self.strangers[http.transport] = loop.call_later(HEADERS_WITHIN_S, self._look_for_headers, http)
@@ -63,7 +63,7 @@ class Gate:
             left_s = ANSWERED_WITHIN_S - HEADERS_WITHIN_S
             self.strangers[transport] = asyncio.get_running_loop().call_later(left_s, self._end, transport)
 
-    def _watches(self, transport: asyncio.Transport) -> None:
+    def _keep_open(self, transport: asyncio.Transport) -> None:
         if timer := self.strangers.get(transport):
             timer.cancel()
 

@@ -19,7 +19,7 @@ from bifa.live.cycle_speed import CycleSpeed
 from bifa.live.rounds import Latest, Pace
 
 REPORT_S = 0.1
-MOST_ASKED = 16
+MAX_REQUESTS = 16
 MOVING = ("running", "holding")
 _LOOK_S = 0.02  # longest time that a request waits for the robot's samples
 _EVERY_NTH = 5  # every fifth sample is shown: 20 a second
@@ -28,7 +28,7 @@ _BETWEEN_STOPS_S = 0.02  # so that repeated stops leave room on the line for the
 Tell = Callable[[dict[str, Any], list[dict[str, Any]]], None]
 
 
-class NobodyThereError(BifaError):
+class NotConnectedError(BifaError):
     """The robot is not connected, or no longer."""
 
 
@@ -61,7 +61,7 @@ class Stopper:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Request:
     """A request: what to do, whether that changes the robot's parameters or presets, and the future of its result."""
 
     what: Callable[[Uno], Any]
@@ -75,7 +75,7 @@ class Pilot:
     None if it was not stopped."""
 
     def __init__(self) -> None:
-        self._asked: deque[_Asked] = deque()
+        self._requests: deque[_Request] = deque()
         self._stop: Future[Any] | None = None  # requested, and not yet confirmed
         self._lock = threading.Lock()
         self._stopper: Stopper | None = None
@@ -90,11 +90,11 @@ class Pilot:
         future: Future[Any] = Future()
         with self._lock:
             if not self._is_flying:
-                future.set_exception(NobodyThereError(self._ended))
-            elif len(self._asked) >= MOST_ASKED:
+                future.set_exception(NotConnectedError(self._ended))
+            elif len(self._requests) >= MAX_REQUESTS:
                 future.set_exception(BusyError("the robot is busy with earlier requests; try again, or stop it"))
             else:
-                self._asked.append(_Asked(what, changes, future))
+                self._requests.append(_Request(what, changes, future))
         return future
 
     def stop(self, by: str = "a page") -> Future[Any]:
@@ -103,11 +103,11 @@ class Pilot:
         if stopper := self._stopper:
             stopper.stop()
         with self._lock:
-            dropped = [asked.future for asked in self._asked]
-            self._asked.clear()
+            dropped = [request.future for request in self._requests]
+            self._requests.clear()
             future = self._stop or Future()
             if not self._is_flying:
-                future.set_exception(NobodyThereError(self._ended))
+                future.set_exception(NotConnectedError(self._ended))
             elif self._stop is None:
                 self._stop = future
                 self.stopped = {"by": by, "at": wall_clock(), "is_confirmed": None, "why": ""}
@@ -129,8 +129,8 @@ class Pilot:
 
         tell(changes, samples): called every REPORT_S with the present state and the new samples, as plain types.
         position_mm: reads the positions of the robot's ends, if an instrument can be read at any moment. came_back: why
-        the robot stands still, if it was disconnected and is back. Raises LinkError or a ConnectionError if the robot
-        is disconnected, or if a stop was not confirmed and nobody watches; calls `tell` first.
+        the robot stands still, if its link was lost and is back. Raises LinkError or a ConnectionError if the link
+        is lost, or if a stop was not confirmed and nobody watches; calls `tell` first.
         """
         self._stopper = Stopper(uno.send_stop)
         try:
@@ -142,48 +142,48 @@ class Pilot:
                     uno.stream(True)
                     _Flight(self, uno, clock, tell, position_mm).follow(duration_s)
                 except (LinkError, ConnectionError) as error:  # tell the pages before the stop is tried
-                    self._gone(error, tell)
+                    self._report_disconnect(error, tell)
                     raise
                 finally:
                     self._land()
         except (LinkError, ConnectionError) as error:
-            self._gone(error, tell)
+            self._report_disconnect(error, tell)
             raise
         finally:
             self._stopper.end()
 
-    def _gone(self, error: Exception, tell: Tell) -> None:
-        self._ended = f"the robot is disconnected: {error}"
+    def _report_disconnect(self, error: Exception, tell: Tell) -> None:
+        self._ended = f"the link to the robot is lost: {error}"
         tell({"gone": str(error), "robot": "gone"}, [])
 
     def _take_off(self, came_back: str) -> None:
         with self._lock:
             self._is_flying = True
-            self.stopped = _by_itself(came_back) if came_back else None
+            self.stopped = _spontaneous_stop(came_back) if came_back else None
             self._ended = "bifa monitor has ended; the robot was stopped"
 
     def _land(self) -> None:
         """Refuse all further requests."""
         with self._lock:
             self._is_flying = False
-            left = [asked.future for asked in self._asked] + ([self._stop] if self._stop else [])
-            self._asked.clear()
+            left = [request.future for request in self._requests] + ([self._stop] if self._stop else [])
+            self._requests.clear()
             self._stop = None
         for future in left:
             if not future.done():
-                future.set_exception(NobodyThereError(self._ended))
+                future.set_exception(NotConnectedError(self._ended))
 
     # -- for the flight ---------------------------------------------------------------------------------------
 
-    def next_asked(self) -> _Asked | None:
+    def next_request(self) -> _Request | None:
         """Return the next request, or None; a requested stop comes first."""
         with self._lock:
             if self._stop is not None:
-                return _Asked(self._stop_now, False, self._stop)
-            while self._asked:
-                asked = self._asked.popleft()
-                if asked.future.set_running_or_notify_cancel():
-                    return asked
+                return _Request(self._stop_now, False, self._stop)
+            while self._requests:
+                request = self._requests.popleft()
+                if request.future.set_running_or_notify_cancel():
+                    return request
             return None
 
     def _stop_now(self, uno: Uno) -> None:
@@ -200,9 +200,9 @@ class Pilot:
         """Record that the robot stopped without a request from here."""
         with self._lock:
             if self._stop is None:
-                self.stopped = _by_itself(why)
+                self.stopped = _spontaneous_stop(why)
 
-    def moves(self) -> None:
+    def clear_stopped(self) -> None:
         """Record that the robot moves again after an earlier stop."""
         with self._lock:
             if self._stop is None:
@@ -219,11 +219,11 @@ class _Flight:
         self._position_mm = position_mm
         self._latest, self._speed = Latest(), CycleSpeed()
         self._state = ""
-        self._learnt: dict[str, Any] = {}
+        self._settings: dict[str, Any] = {}
 
     def follow(self, duration_s: float | None) -> None:
         """Run until `duration_s` is over, or for ever."""
-        self._learn()
+        self._read_settings()
         pace, begun_s = Pace(self._clock), self._clock.now()
         while duration_s is None or self._clock.now() - begun_s < duration_s:
             until_s, samples = self._clock.now() + REPORT_S, []
@@ -231,51 +231,51 @@ class _Flight:
                 samples += self._uno.samples(min(left_s, _LOOK_S))
                 self._do_next()
             self._latest.take(samples)
-            self._notice()
+            self._update_state()
             self._tell(*self._report(samples))
             pace.wait()
 
     def _do_next(self) -> None:
-        if not (asked := self._pilot.next_asked()):
+        if not (request := self._pilot.next_request()):
             return
         try:
-            answer = asked.what(self._uno)
-            if asked.changes:
-                self._learn()
+            answer = request.what(self._uno)
+            if request.changes:
+                self._read_settings()
         except StillMovingError as error:
             self._tell_now()
-            asked.future.set_exception(error)
+            request.future.set_exception(error)
             if not self._pilot.is_watched():
                 raise
         except BifaError as error:  # refused: the requester gets the error
-            asked.future.set_exception(error)
+            request.future.set_exception(error)
         except BaseException as error:
-            asked.future.set_exception(NobodyThereError(str(error) or "bifa monitor has ended"))
+            request.future.set_exception(NotConnectedError(str(error) or "bifa monitor has ended"))
             raise
         else:
             self._tell_now()
-            asked.future.set_result(answer)
+            request.future.set_result(answer)
 
     def _tell_now(self) -> None:
         """Report what was just done, before the request is answered."""
-        self._tell({"stopped": self._pilot.stopped, **self._learnt}, [])
+        self._tell({"stopped": self._pilot.stopped, **self._settings}, [])
 
-    def _learn(self) -> None:
+    def _read_settings(self) -> None:
         """Read the robot's parameters and presets, for every page to show."""
         parameters, is_pending = self._uno.parameters_and_pending()
-        self._learnt = {"parameters": parameters, "presets": self._uno.presets(), "is_pending": is_pending}
+        self._settings = {"parameters": parameters, "presets": self._uno.presets(), "is_pending": is_pending}
 
-    def _notice(self) -> None:
+    def _update_state(self) -> None:
         """Find out why the robot stopped, if it did so by itself, and whether pending parameters have been adopted."""
         state = self._latest.sample.state if self._latest.sample else ""
         if state != self._state:
             if self._state in MOVING and state not in MOVING and self._pilot.stopped is None:
-                self._pilot.stopped_by_itself(_why(self._uno))
+                self._pilot.stopped_by_itself(_stop_reason(self._uno))
             elif state in MOVING:
-                self._pilot.moves()
+                self._pilot.clear_stopped()
             self._state = state
-        if self._learnt["is_pending"]:
-            self._learn()
+        if self._settings["is_pending"]:
+            self._read_settings()
 
     def _report(self, samples: list[Sample]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         shown = [_shown(sample) for sample in samples if sample.sequence % _EVERY_NTH == 0]
@@ -284,7 +284,7 @@ class _Flight:
             "link": self._uno.counters.text(),
             "warning": self._latest.warning,
             "stopped": self._pilot.stopped,
-            **self._learnt,
+            **self._settings,
         }
         if newest := self._latest.sample:
             report |= {"robot": newest.state, "uno_s": newest.time_us / 1e6, "chambers": _chambers(newest)}
@@ -300,11 +300,11 @@ class _Flight:
         return report, shown
 
 
-def _by_itself(why: str) -> dict[str, Any]:
+def _spontaneous_stop(why: str) -> dict[str, Any]:
     return {"by": "", "at": wall_clock(), "is_confirmed": True, "why": why}
 
 
-def _why(uno: Uno) -> str:
+def _stop_reason(uno: Uno) -> str:
     status = uno.status()
     if status.state == "fault":
         return f"fault {status.fault}: see `status` in bifa console"

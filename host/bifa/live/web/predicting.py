@@ -16,10 +16,10 @@ from bifa.robot.gait import Gait
 from bifa.simulate import speed
 
 _DRAWS = 128  # half a second of one core
-_REMEMBERED = 32
+_CACHE_SIZE = 32
 
 
-def step_back() -> None:
+def lower_priority() -> None:
     """Lower this thread's priority below all others'; only Linux can do so for a single thread."""
     if sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
@@ -30,7 +30,7 @@ class GaitPrediction:
 
     def __init__(self, model: Model):
         self._model = model
-        self.in_full = lru_cache(_REMEMBERED)(self._in_full)
+        self.in_full = lru_cache(_CACHE_SIZE)(self._in_full)
 
     def at_once(self, gait: Gait) -> dict[str, Any]:
         """Return the model's own prediction: speed and slip, or an error."""

@@ -36,8 +36,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.live.web.gate import ACCEPTED_AT_ONCE, LARGEST_HEADERS, LARGEST_MESSAGE, Gate
-from bifa.live.web.pilot import MOVING, BusyError, NobodyThereError, Pilot, wall_clock
-from bifa.live.web.predicting import GaitPrediction, step_back
+from bifa.live.web.pilot import MOVING, BusyError, NotConnectedError, Pilot, wall_clock
+from bifa.live.web.predicting import GaitPrediction, lower_priority
 from bifa.ranges import RANGES
 from bifa.robot import Model
 from bifa.robot.gait import GAIT_NAMES, Gait
@@ -45,9 +45,9 @@ from bifa.robot.gait import GAIT_NAMES, Gait
 HOST = "127.0.0.1"
 PROTOCOL = "bifa"  # subprotocol of the websocket; the token is offered as another
 _ANSWER_S = 15.0  # longest time that a page waits for the robot
-_BACK_WITHIN_S = 3.0  # a page that comes back within this time was reloaded, not closed
-_HANDED_OVER_S = 0.05
-_WAITING = 64  # messages by which a slow page may lag
+_RELOAD_WINDOW_S = 3.0  # a page that comes back within this time was reloaded, not closed
+_FLUSH_POLL_S = 0.05
+_MAX_QUEUED = 64  # messages by which a slow page may lag
 _PIECE = 64 * 1024
 SHOWN_S = 20.0
 
@@ -56,7 +56,7 @@ class ServerError(BifaError):
     """The page cannot be served there."""
 
 
-class AskedWrongError(ServerError):
+class BadRequestError(ServerError):
     """An invalid request, which the page itself would never send."""
 
 
@@ -78,7 +78,7 @@ class OpenPage:
 
     number: int
     is_owner: bool
-    messages: asyncio.Queue[str] = field(default_factory=lambda: asyncio.Queue(_WAITING))
+    messages: asyncio.Queue[str] = field(default_factory=lambda: asyncio.Queue(_MAX_QUEUED))
     answers: set[asyncio.Task[None]] = field(default_factory=set)
 
     def tell(self, message: Mapping[str, Any] | str) -> None:
@@ -125,7 +125,7 @@ class LivePage:
         self.pages: set[OpenPage] = set()
         self._numbers = itertools.count(1)
         self.loop: asyncio.AbstractEventLoop | None = None  # the server's, which sends to the pages
-        self._predictor = ThreadPoolExecutor(1, "predictor", step_back)
+        self._predictor = ThreadPoolExecutor(1, "predictor", lower_priority)
         self._predictor.submit(lambda: self._model.predictor)  # draw its robots before the first request
         self._prediction: asyncio.Task[None] | None = None
         self.state = LiveState(
@@ -146,14 +146,14 @@ class LivePage:
         """Send to every page; callable from any thread."""
         if self.loop is not None:
             with contextlib.suppress(RuntimeError):  # the server has just ended
-                self.loop.call_soon_threadsafe(self._heard, changes, samples)
+                self.loop.call_soon_threadsafe(self._take_report, changes, samples)
 
     def flush(self, timeout_s: float = 1.0) -> None:
         """Wait until every page has been sent everything, at most `timeout_s`."""
         until_s = time.monotonic() + timeout_s
-        time.sleep(_HANDED_OVER_S)
+        time.sleep(_FLUSH_POLL_S)
         while any(not page.messages.empty() for page in list(self.pages)) and time.monotonic() < until_s:
-            time.sleep(_HANDED_OVER_S)
+            time.sleep(_FLUSH_POLL_S)
 
     def app(self) -> Starlette:
         """Return the application with its routes."""
@@ -169,7 +169,7 @@ class LivePage:
 
     # -- the state --------------------------------------------------------------------------------------------
 
-    def _heard(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
+    def _take_report(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
         """Take over the robot's part of the state."""
         self._change(changes, samples)
         if self.state.content["draft"] is None and "parameters" in changes:
@@ -227,44 +227,46 @@ class LivePage:
         sending = asyncio.create_task(_send(socket, page))
         try:
             while True:
-                self._hear(page, await socket.receive_text())
+                self._handle(page, await socket.receive_text())
         except (WebSocketDisconnect, RuntimeError):
             pass
-        except (AskedWrongError, KeyError) as error:  # KeyError: bytes instead of text
+        except (BadRequestError, KeyError) as error:  # KeyError: bytes instead of text
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await socket.close(1007, str(error))
         finally:
             sending.cancel()
             self.pages.discard(page)
             if page.is_owner and not self.is_watched():
-                asyncio.get_running_loop().call_later(_BACK_WITHIN_S, self._closed)
+                asyncio.get_running_loop().call_later(_RELOAD_WINDOW_S, self._closed)
 
     def _closed(self) -> None:
         """Stop a moving robot if the last page was closed and none has come back. A robot at rest is left alone."""
         moves = self.state.content["robot"] in MOVING
         if moves and self.state.content["stops_when_closed"] and not self.is_watched():
-            self.pilot.stop("the last page was closed").add_done_callback(_seen)
+            self.pilot.stop("the last page was closed").add_done_callback(_ignore_result)
 
     # -- asking -----------------------------------------------------------------------------------------------
 
-    def _hear(self, page: OpenPage, text: str) -> None:
+    def _handle(self, page: OpenPage, text: str) -> None:
         """Handle one request of a page: {"id": 1, "do": "apply", ...}; the answer has the same id."""
         try:
             asked = json.loads(text)
             number, name = asked["id"], str(asked["do"])
         except (ValueError, KeyError, TypeError, RecursionError):
-            raise AskedWrongError('not a valid request: send {"id": 1, "do": "stop"}') from None
+            raise BadRequestError('not a valid request: send {"id": 1, "do": "stop"}') from None
         if name == "stop":
             self._answer_later(page, number, self._stop(f"page {page.number}"))
         elif not page.is_owner:
             page.tell({"id": number, "error": "open the page by the address that bifa monitor printed"})
         else:
-            self._do(page, number, name, asked)
+            self._dispatch(page, number, name, asked)
 
-    def _do(self, page: OpenPage, number: Any, name: str, asked: Mapping[str, Any]) -> None:
-        acts: dict[str, Callable[[], Awaitable[str] | str]] = {
-            "run": lambda: _waited(self.pilot.ask(lambda uno: uno.run()), "walking"),
-            "clear": lambda: _waited(self.pilot.ask(lambda uno: uno.clear()), "released: the robot may walk again"),
+    def _dispatch(self, page: OpenPage, number: Any, name: str, asked: Mapping[str, Any]) -> None:
+        actions: dict[str, Callable[[], Awaitable[str] | str]] = {
+            "run": lambda: _reply_when_done(self.pilot.ask(lambda uno: uno.run()), "walking"),
+            "clear": lambda: _reply_when_done(
+                self.pilot.ask(lambda uno: uno.clear()), "released: the robot may walk again"
+            ),
             "apply": lambda: self._upload(_gait(asked)),
             "save": lambda: self._upload(_gait(asked), str(asked.get("preset", ""))),
             "load": lambda: self._load(str(asked.get("preset", ""))),
@@ -272,9 +274,9 @@ class LivePage:
             "closing": lambda: self._closing(asked),
         }
         try:
-            if name not in acts:
-                raise AskedWrongError(f"unknown request {name!r}; a page may ask for stop, {', '.join(acts)}")
-            said = acts[name]()
+            if name not in actions:
+                raise BadRequestError(f"unknown request {name!r}; a page may ask for stop, {', '.join(actions)}")
+            said = actions[name]()
         except BifaError as error:
             page.tell({"id": number, "error": str(error)})
             return
@@ -285,7 +287,7 @@ class LivePage:
 
     def _answer_later(self, page: OpenPage, number: Any, answer: Awaitable[str]) -> None:
         async def answering() -> None:
-            page.tell({"id": number, **(await _answered(answer))[1]})
+            page.tell({"id": number, **(await _response_to(answer))[1]})
 
         task = asyncio.ensure_future(answering())
         page.answers.add(task)
@@ -293,7 +295,7 @@ class LivePage:
 
     def _upload(self, gait: Gait, preset: str | None = None) -> Awaitable[str]:
         said = f"saved as {preset}" if preset is not None else "applied; a walking robot adopts it at its next cycle"
-        return _waited(self.pilot.ask(lambda uno: uno.upload(gait.as_dict(), save=preset), changes=True), said)
+        return _reply_when_done(self.pilot.ask(lambda uno: uno.upload(gait.as_dict(), save=preset), changes=True), said)
 
     def _load(self, preset: str) -> Awaitable[str]:
         def load(uno: Uno) -> dict[str, float]:
@@ -303,7 +305,7 @@ class LivePage:
         loaded = self.pilot.ask(load, changes=True)
 
         async def shown() -> str:
-            said = await _waited(loaded, f"loaded {preset}; a walking robot adopts it at its next cycle")
+            said = await _reply_when_done(loaded, f"loaded {preset}; a walking robot adopts it at its next cycle")
             self._draft(_of_gait(loaded.result()), by=0)
             return said
 
@@ -312,7 +314,7 @@ class LivePage:
     def _closing(self, asked: Mapping[str, Any]) -> str:
         stop = asked.get("stop")
         if not isinstance(stop, bool):
-            raise AskedWrongError("stop must be true or false")
+            raise BadRequestError("stop must be true or false")
         self._change({"stops_when_closed": stop})
         return f"when the last page closes, the robot {'stops' if stop else 'keeps going'}"
 
@@ -328,7 +330,7 @@ class LivePage:
 
     async def _stop_by_request(self, request: Request) -> Response:
         """Stop the robot, whatever the request contains and whoever sends it."""
-        status, answer = await _answered(self._stop("a request to /stop"))
+        status, answer = await _response_to(self._stop("a request to /stop"))
         return JSONResponse(answer, status, {"Connection": "close"})
 
 
@@ -346,14 +348,14 @@ async def _send(socket: WebSocket, page: OpenPage) -> None:
             await socket.send_text(await page.messages.get())
 
 
-async def _waited(future: Future[Any], said: str) -> str:
+async def _reply_when_done(future: Future[Any], said: str) -> str:
     """Return `said` once the request is done. A request that has not begun in time is cancelled, so that it is not
     carried out later without the page's knowledge."""
     await asyncio.wait_for(asyncio.wrap_future(future), _ANSWER_S)
     return said
 
 
-def _seen(future: Future[Any]) -> None:
+def _ignore_result(future: Future[Any]) -> None:
     """Retrieve the exception of a future that nobody awaits; the pilot reports what went wrong."""
     if not future.cancelled():
         future.exception()
@@ -362,7 +364,7 @@ def _seen(future: Future[Any]) -> None:
 def _gait(asked: Mapping[str, Any]) -> Gait:
     given = asked.get("gait")
     if not isinstance(given, Mapping) or set(given) != set(GAIT_NAMES):
-        raise AskedWrongError(f"a gait needs {', '.join(GAIT_NAMES)}")
+        raise BadRequestError(f"a gait needs {', '.join(GAIT_NAMES)}")
     return Gait(**given)
 
 
@@ -371,13 +373,13 @@ def _of_gait(parameters: Mapping[str, float]) -> dict[str, float]:
     return {name: round(parameters[name], 4) for name in GAIT_NAMES}
 
 
-async def _answered(said: Awaitable[str]) -> tuple[int, dict[str, Any]]:
+async def _response_to(said: Awaitable[str]) -> tuple[int, dict[str, Any]]:
     """Return the HTTP status and the content of the answer to a request."""
     try:
         return 200, {"said": await said}
-    except AskedWrongError as error:
+    except BadRequestError as error:
         return 400, {"error": str(error)}
-    except (NobodyThereError, BusyError) as error:
+    except (NotConnectedError, BusyError) as error:
         return 503, {"error": str(error)}
     except BifaError as error:
         return 409, {"error": str(error)}

@@ -13,7 +13,7 @@ from lacuna.system import Channels
 
 _SEEN = ("displacement_head", "displacement_tail")
 _ROWS = {"displacement_head_mm": 0, "displacement_tail_mm": 1, "displacement_mm": 0}  # the body moves the head's end
-_JUST_S = 1e-6
+_TIME_TOL_S = 1e-6
 _PAIRS = tuple((mine, other) for mine in range(3) for other in range(3) if mine != other)
 
 
@@ -48,7 +48,7 @@ def _pressure_sensor_inflow(channels: Channels, curve: LearntCurve, inputs: Inpu
         positive_psi, rest_psi = plant.q[layout.SUPPLY_POSITIVE], 0.0
     else:  # a step response starts under vacuum
         positive_psi, rest_psi = inputs.pressure_psi, vacuum_psi
-    before = inputs.commands.at(inputs.time_s - _JUST_S)  # a sample at the time of a switch precedes it
+    before = inputs.commands.at(inputs.time_s - _TIME_TOL_S)  # a sample at the time of a switch precedes it
     let_in = np.array([vacuum_psi, positive_psi, rest_psi])[before]
     return {
         name: psi + curve.at(let_in[:, chamber] - psi, row_of(name, inputs))
