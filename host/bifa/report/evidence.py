@@ -21,7 +21,7 @@ _COLORS = ("quiet", "before", "after")  # one per gait
 def errors_chart(error: Mapping[str, Any]) -> Chart:
     """Plot the error before and after, and the noise floor, on a logarithmic axis.
 
-    error: the `error` object of `bifa diagnose --json` (contracts, section 5), RMS in units of the noise.
+    error: the `error` object of `bifa diagnose --json`, RMS in units of the noise.
     """
     before, after = _bars(error["before"]), _bars(error["after"])
     pairs = {name: (before[name], after[name]) for name in before if name in after}

@@ -10,7 +10,7 @@ from virtual_robot import sealed
 from virtual_robot.effects import LIBRARY, OUTSIDE
 from virtual_robot.sealed import SealedError, draw_effects, generate, main
 
-CONTRACT = {  # contracts.md, section 5
+CONTRACT = {
     *("hysteresis", "viscoelasticity", "backlash", "area_variation", "valve_latency", "valve_asymmetry"),
     *("line_lag", "choked_flow", "leak", "supply_sag", "regulator_ripple", "sensor_lag", "sensor_position"),
     *("sensor_calibration", "stribeck", "friction_direction", "inclination", "tether_drag"),
