@@ -280,9 +280,7 @@ def fit_base(system: System, trials: Sequence[Record]) -> Fit:
     for _ in range(MAX_REESTIMATES):
         sharper = floor.lowered_by(estimate_noise(system, trials, found.residuals()))
         fallen, floor = sharper.share_of(floor), sharper
-        problem = found.problem.over(trials, floor)
-        solution = solve(problem, found.solution.point, max_iterations=10)
-        found = Fit(problem, solution, found.starts, found.starts_agreeing)
+        found = reweigh(found, floor, max_iterations=10)
         if fallen >= REFIT_SHARE:
             break
     return found
