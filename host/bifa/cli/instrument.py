@@ -90,7 +90,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
     console.print(f"{file}: {how}; {len(seen.sheet)} rows from line {seen.sheet.line(0)} on")
     for role, name in seen.presets.items():
         console.print(f"As the file of a {role}, it matches the preset {name}.")
-    labels, units = seen.sheet.labels(), seen.sheet.units
+    labels, units = seen.sheet.labels(), map(" ".join, seen.sheet.units)
     rows = [[label, unit, *row] for label, unit, row in zip(labels, units, zip(*seen.rows(), strict=True), strict=True)]
     print_table(console, PageTable(["column", "units row", *["row"] * len(seen.rows())], rows, ""))
     for place, label in list(enumerate(labels))[:_MAX_PLOTS]:
@@ -119,9 +119,11 @@ def _ask_declaration(console: "Console", seen: "Look", role: str) -> dict[str, A
     sign: dict[str, int] = {}
     more: dict[str, Any] = {}
     for name in [*wanted(role), *(["displacement_tail_mm"] if role == "camera" else [])]:
-        proposed = given.columns.get(name) if given else seen.guess(name)
+        proposed = given.columns.get(name) if given else None
+        if not (proposed and seen.sheet.has(proposed)):
+            proposed = seen.guess(name) if name != "displacement_tail_mm" else None  # it would be the head's again
         if name != "time_s":
-            proposed = proposed if proposed is not None and seen.sheet.has(proposed) else "-"
+            proposed = proposed or "-"
         column = _column(console, seen, name, proposed)
         if column == "-":
             continue

@@ -49,14 +49,15 @@ _UNIT_ALIASES = {
     "inch": "in",
     "lb": "lbf",
     "volts": "v",
+    "lbs": "lbf",
 }
 _UNIT_ALIASES |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
-_ROWS = {"skip_rows": 0, "header_rows": 1, "units_rows": 0}  # and the minimum of each
+_ROWS = {"skip_rows": 0, "header_rows": 0, "units_rows": 0}  # and the minimum of each
 _CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ",")}
 _TABLES = ("columns", "units", "factor", "sign", "offset")  # keyed by the data set's columns
-_KEYS = ("preset", *_CHOICES, "separator", "encoding", *_ROWS, "header", "sheet", *_TABLES, "where", "sync")
+_KEYS = ("preset", *_CHOICES, "separator", "encoding", *_ROWS, "header", "above", "sheet", *_TABLES, "where", "sync")
 _KEYS += ("rate_hz", "date_format", "zone")
-_BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*$")
+_BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]")
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
 _THRESHOLD = 2.5  # V, for a strobe of 5 V
@@ -106,10 +107,14 @@ def read_columns(
     sheet: Sheet, export: Export, wanted: Iterable[str], optional: Iterable[str] = ()
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Read columns under the data set's names and in its units, NaN where a cell is empty, and the indices of the
-    sheet's rows that they come from. Raises DatasetError naming file, line, column and cell."""
+    sheet's rows that they come from; rows at the end in which all these columns are empty belong to other columns.
+    Raises DatasetError naming file, line, column and cell."""
     rows = _rows(sheet, export)
     there = [name for name in optional if name in export.columns or name in sheet.labels()]
-    return {name: _column(sheet, export, name)[rows] for name in (*wanted, *there)}, rows
+    columns = {name: _column(sheet, export, name, rows) for name in (*wanted, *there)}
+    filled = np.flatnonzero(np.any([~np.isnan(values) for values in columns.values()], axis=0))
+    count = filled[-1] + 1 if len(filled) else 0
+    return {name: values[:count] for name, values in columns.items()}, rows[:count]
 
 
 def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarray) -> np.ndarray:
@@ -117,7 +122,7 @@ def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, 
     time_s = columns["time_s"]
     if export.sync == _SYNC_FRAMES:
         return time_s
-    level = sheet.numbers(sheet.find(export.sync), export.sync)[rows]
+    level = sheet.numbers(sheet.find(export.sync), export.sync, rows)
     step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else np.inf
     if step_s > SLOWEST_SYNC_S:
         raise sheet.error(
@@ -130,9 +135,8 @@ def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, 
 
 def dated_edges(export: Export, sheet: Sheet, rows: np.ndarray, edges: Sheet) -> np.ndarray:
     """Times of the edges in a separate file, in s since the record's first row, if both files write dates."""
-    first = _date_cells(sheet, export.columns.get("time_s", "time_s"))[rows[0]]
-    cells = _date_cells(edges, "sync_time_s")
-    return _seconds(edges, export, [first, *cells], "sync_time_s")[1:]
+    first = _moments(sheet, export, export.columns.get("time_s", "time_s"), rows[:1])
+    return _seconds(_moments(edges, export, "sync_time_s", np.arange(len(edges))), first)
 
 
 def _rows(sheet: Sheet, export: Export) -> np.ndarray:
@@ -152,14 +156,15 @@ def _same(cell: str, value: Any) -> bool:
         return False
 
 
-def _column(sheet: Sheet, export: Export, name: str) -> np.ndarray:
+def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.ndarray:
     source = export.columns.get(name, name)
     unit = export.units.get(name)
     if unit == DATE:
-        return _seconds(sheet, export, _date_cells(sheet, source), source)
+        moments = _moments(sheet, export, source, rows)
+        return _seconds(moments, moments)
     place = sheet.find(source)
     _refuse_other_unit(sheet, place, name, unit)
-    values = sheet.numbers(place, source)
+    values = sheet.numbers(place, source, rows)
     return values * _scale(export, name) + export.offset.get(name, 0.0)
 
 
@@ -172,22 +177,23 @@ def _scale(export: Export, name: str) -> float:
     return size * export.factor.get(name, 1.0) * export.sign.get(name, 1)
 
 
-def _date_cells(sheet: Sheet, source: str) -> list[str]:
-    """Dates from one column, or from several that together form one date ("Date + Time")."""
-    parts = [sheet.cells(sheet.find(part)) for part in source.split(" + ")]
-    return [" ".join(part) for part in zip(*parts, strict=True)]
-
-
-def _seconds(sheet: Sheet, export: Export, cells: list[str], source: str) -> np.ndarray:
-    """Seconds since the first of the dates in `cells`."""
+def _moments(sheet: Sheet, export: Export, source: str, rows: np.ndarray) -> list[datetime]:
+    """Dates in `rows` of one column, or of several that together form one date ("Date + Time")."""
     zone, moments = _zone(export.zone) if export.zone else None, []
-    for row, cell in enumerate(cells):
+    parts = [sheet.cells(sheet.find(part)) for part in source.split(" + ")]
+    for row in rows:
+        cell = " ".join(part[row] for part in parts)
         try:
             moments.append(_moment(cell, export.date_format, zone))
         except ValueError:
             form = f"of the form {export.date_format!r}" if export.date_format else "in ISO 8601 format"
             raise sheet.error(f"{cell!r} is not a date {form}", row, source) from None
-    return np.array([(moment - moments[0]).total_seconds() for moment in moments])
+    return moments
+
+
+def _seconds(moments: list[datetime], since: list[datetime]) -> np.ndarray:
+    """Seconds of `moments` since the first of `since`."""
+    return np.array([(moment - since[0]).total_seconds() for moment in moments])
 
 
 def _moment(cell: str, form: str | None, zone: ZoneInfo | None) -> datetime:
@@ -218,18 +224,17 @@ def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) ->
 
 
 def unit_in_file(sheet: Sheet, place: int) -> str | None:
-    """Return the unit that a file itself gives for a column: in a row of units, or in brackets after its name."""
-    name = sheet.names[place][-1] if sheet.names[place] else ""
-    return unit_in(sheet.units[place]) or (unit_in(name) if _BRACKETS.search(name) else None)
+    """Return the unit that a file itself gives for a column: in a row of units, or in brackets in its name."""
+    named = [name for name in sheet.names[place][-1:] if _BRACKETS.search(name)]
+    return next(filter(None, map(unit_in, (*sheet.units[place], *named))), None)
 
 
 def unit_in(text: str) -> str | None:
-    """Return the unit that a text ends with in brackets, or consists of; None if there is none."""
-    found = _BRACKETS.search(text)
-    word = (found[1] if found else text).strip()
-    word = _UNIT_ALIASES.get(word.lower(), word)
+    """Return the last unit that a text has in brackets or, without brackets, consists of; None if there is none."""
+    words = [word.strip() for word in _BRACKETS.findall(text) or [text]]
+    words = [_UNIT_ALIASES.get(word.lower(), word) for word in words]
     known = {unit for sizes in UNITS.values() for unit in sizes}
-    return word if word in known else None
+    return next((word for word in reversed(words) if word in known), None)
 
 
 def _sizes(name: str) -> Mapping[str, float]:
@@ -284,7 +289,7 @@ def _sync(fields: Fields) -> tuple[str, float]:
 
 
 def _form(fields: Fields) -> SheetForm:
-    how: dict[str, Any] = {key: fields.text(key) for key in ("header", "encoding", "sheet") if key in fields}
+    how: dict[str, Any] = {key: fields.text(key) for key in ("header", "above", "encoding", "sheet") if key in fields}
     how |= {key: fields.whole(key, least, 9999) for key, least in _ROWS.items() if key in fields}
     how |= {key: fields.choice(key, allowed) for key, allowed in _CHOICES.items() if key in fields}
     mark = fields.take("separator") if "separator" in fields else ","

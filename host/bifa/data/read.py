@@ -87,7 +87,8 @@ def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> di
 def _check_header(sheet: Sheet, layout: Layout) -> None:
     """Raise DatasetError unless the header of a file in the data set's own form has each required column once, each
     optional one at most once, and no others."""
-    names, expected = sheet.labels(), f"the columns of this experiment are {', '.join(layout.all_columns)}"
+    names = [" / ".join(parts) for parts in sheet.names]
+    expected = f"the columns of this experiment are {', '.join(layout.all_columns)}"
     for place, name in enumerate(names):
         if name.startswith("#"):
             raise sheet.error('begins with #, as numpy.savetxt writes it; write it with comments=""', -1, name)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,13 +27,15 @@ SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NAMES_OF = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
 _HEAD = 1 << 18  # bytes in which a header has to be found
 _MAX_LISTED = 8
+_PLACE = re.compile(r"(?:(.+) )?\[([1-9]\d*)\]", re.ASCII)  # "X [2]", the second X; "[2]", the second of all
 
 
 @dataclass(frozen=True)
 class SheetForm:
     """How a file is written. The column names are in `header_rows` rows after the first `skip_rows` or, if `header` is
     given, in the rows up to the line whose first cell is this text; below them follow `units_rows` rows that are not
-    data. `encoding` is Python's name for it; `sheet` names the sheet of a workbook."""
+    data. Without rows of names, columns are known by their places, "[2]". `above`: a text that has to occur above the
+    names. `encoding` is Python's name for it; `sheet` is the name or the place of a workbook's sheet."""
 
     format: str = "csv"
     separator: str = ","
@@ -42,6 +45,7 @@ class SheetForm:
     header: str | None = None
     header_rows: int = 1
     units_rows: int = 0
+    above: str = ""
     sheet: str | None = None
 
 
@@ -50,7 +54,7 @@ OWN = SheetForm()
 
 class Sheet:
     """A table as written in the file. `names`: the parts of each column's name, one per header row; `units`: each
-    column's text in the rows of units; `first`: line of the first data row. Raises DatasetError if it is no table."""
+    column's cells in the rows of units; `first`: line of the first data row. Raises DatasetError if it is no table."""
 
     def __init__(self, path: Path, form: SheetForm = OWN, file: str | None = None) -> None:
         self._path, self._form, self.file = path, form, str(path) if file is None else file
@@ -58,8 +62,9 @@ class Sheet:
         heads, self._rows = self._workbook() if form.format == "xlsx" else self._text()
         header, units = heads[: len(heads) - form.units_rows], heads[len(heads) - form.units_rows :]
         width = max([len(row) for row in heads], default=0)
+        width = width if form.header_rows else max(width, self._first_width())
         self.names = [_parts(header, place) for place in range(width)]
-        self.units = [" ".join(_parts(units, place)) for place in range(width)]
+        self.units = [_parts(units, place) for place in range(width)]
         self._refuse_other_separator()
 
     # -- reading ---------------------------------------------------------------------------------------------------
@@ -103,14 +108,21 @@ class Sheet:
             ) from None
 
     def _first_head(self, lines: Sequence[str]) -> int:
-        form = self._form
-        if form.header is None:
-            return form.skip_rows
+        """Return the index of the first row of names."""
+        begin = self._form.skip_rows if self._form.header is None else self._first_named(self._form.header, lines)
+        if not any(self._form.above in line for line in ("", *lines[:begin])):
+            raise self._error(
+                f"no line above the column names contains {self._form.above!r}; if the export has other units or "
+                "another form than declared, declare these, and what is above the names (above)"
+            )
+        return begin
+
+    def _first_named(self, header: str, lines: Sequence[str]) -> int:
         for place, line in enumerate(lines):
-            cells = self._cells(line) if place >= form.skip_rows and form.header in line else []
-            if cells and cells[0].strip() == form.header and place + 1 >= form.header_rows:
-                return place - form.header_rows + 1
-        raise self._error(f"no line begins with {form.header!r}, the declared header of the column names")
+            cells = self._cells(line) if place >= self._form.skip_rows and header in line else []
+            if cells and cells[0].strip() == header and place + 1 >= self._form.header_rows:
+                return place - self._form.header_rows + 1
+        raise self._error(f"no line begins with {header!r}, the declared header of the column names")
 
     def _cells(self, line: str, number: int | None = None) -> list[str]:
         if self._form.separator == " ":
@@ -127,11 +139,23 @@ class Sheet:
         self.first = begin + count + 1
         return rows[begin : begin + count], frame.iloc[begin + count :].reset_index(drop=True)
 
+    def _first_width(self) -> int:
+        """Number of columns in the first row of data."""
+        if self._form.format == "xlsx":
+            return int(self._rows.shape[1])
+        return len(self._written(0)) if self._lines else 0
+
     @cached_property
     def _frame(self) -> Any:
         """Columns by position; numeric if pandas could read the whole column as numbers."""
         frame = self._rows if self._form.format == "xlsx" else self._parsed()
         width = len(self.names)
+        if self._form.format == "csv" and self._form.separator == " " and frame.shape[1] < width:
+            raise self.error(  # without a cell for each name, which one is missing is unknown
+                f"{frame.shape[1]} fields, but {width} names: blanks in the names? Skip them (skip_rows), and declare "
+                'header_rows = 0 and columns by their places, "[2]" for the second',
+                0,
+            )
         if frame.shape[1] > width:
             beyond = frame.iloc[:, width:].notna().to_numpy().any(axis=1)
             if beyond.any():
@@ -190,20 +214,19 @@ class Sheet:
                     )
 
     def labels(self) -> list[str]:
-        """Return the full name of each column, its parts joined by " / "."""
-        return [" / ".join(parts) for parts in self.names]
+        """Return the full name of each column, its parts joined by " / ", or its place if it has none, "[2]"."""
+        return [" / ".join(parts) or f"[{place}]" for place, parts in enumerate(self.names, 1)]
 
     def find(self, name: str) -> int:
         """Return the position of the column called `name`, which may be any of its parts in order; "X [2]" is the
-        second column called X. Raises DatasetError if there is none, or several."""
-        bare, _, which = name.removesuffix("]").rpartition(" [")
-        chosen = int(which) if name.endswith("]") and bare and which.isdecimal() else None
+        second column called X, "[2]" the second of all. Raises DatasetError if there is none, or several."""
         places = [place for place, parts in enumerate(self.names) if _is_called(parts, name)]
-        if not places and chosen is not None:
-            named = [place for place, parts in enumerate(self.names) if _is_called(parts, bare)]
-            places = named[chosen - 1 : chosen]
+        if not places and (which := _PLACE.fullmatch(name)):
+            bare, number = which[1], int(which[2])
+            named = [place for place, parts in enumerate(self.names) if bare is None or _is_called(parts, bare)]
+            places = named[number - 1 : number]
         if not places:
-            raise self._error(f"lacks the column {name}; it has {listed(filter(None, self.labels())) or 'none'}")
+            raise self._error(f"lacks the column {name}; it has {listed(self.labels()) or 'none'}")
         if len(places) > 1:
             found = listed(self.labels()[place] for place in places)
             raise self._error(
@@ -228,15 +251,17 @@ class Sheet:
         """Return the line of the file that a data row is on."""
         return self.first + int(row)
 
-    def numbers(self, place: int, name: str) -> np.ndarray:
-        """Return a column as numbers, shape (rows,), NaN for empty cells. Raises DatasetError if a cell is not a
-        number."""
+    def numbers(self, place: int, name: str, rows: np.ndarray | None = None) -> np.ndarray:
+        """Return a column, or the `rows` of it, as numbers, NaN for empty cells. Raises DatasetError if one of these
+        cells is not a number."""
+        rows = np.arange(len(self)) if rows is None else rows
         if place >= self._frame.shape[1]:
-            return np.full(len(self), np.nan)
+            return np.full(len(rows), np.nan)
         column = self._frame.iloc[:, place]
         if column.dtype.kind in "fiu" and not (self._form.decimal == "," and b"." in self._rows):
-            return column.to_numpy(float)
-        return np.array([self._number(cell, row, name) for row, cell in enumerate(self.cells(place))], float)
+            return column.to_numpy(float)[rows]
+        cells = self.cells(place)
+        return np.array([self._number(cells[row], int(row), name) for row in rows], float)
 
     def cells(self, place: int) -> list[str]:
         """Return a column as the text in the file."""
@@ -252,10 +277,19 @@ class Sheet:
         cell = cell.strip(BLANKS)
         found = number(cell if mark == "." else cell.replace(".", " ").replace(mark, "."))
         if found is None and cell:
-            comma = mark == "." and cell.count(",") == 1 and decimal(cell.replace(",", ".")) is not None
-            hint = '; a decimal comma? Write points, or declare decimal = ","' if comma else ""
-            raise self.error(f"{_shown(cell)} is not a number{hint}", row, name)
+            raise self.error(f"{_shown(cell)} is not a number{self._hint(cell)}", row, name)
         return np.nan if found is None else found
+
+    def _hint(self, cell: str) -> str:
+        """What to do about a number that is written in another way than declared; "" if it is none."""
+        mark = self._form.decimal
+        if decimal(cell.replace("," if mark == "." else ".", "").replace(mark, ".")) is None:
+            return ""
+        if mark == ",":
+            return '; decimal points, or points between thousands? Declare decimal = ".", or export without them'
+        if cell.count(",") == 1 and "." not in cell:
+            return '; a decimal comma? Write points, or declare decimal = ","'
+        return "; commas between thousands? Export numbers without them"
 
     def error(self, problem: str, row: int | None = None, column: str | None = None) -> DatasetError:
         """Return an error located at a row of the data."""
@@ -284,15 +318,29 @@ def _exact() -> dict[str, str]:
 
 
 def workbook(path: Path, sheet: str | None, file: str) -> tuple[Any, list[list[str]]]:
-    """Read a sheet of a workbook (the first if `sheet` is None): the DataFrame of pandas, and the cells as text.
-    Raises DatasetError."""
+    """Read a sheet of a workbook (by its name or place; the first if `sheet` is None): the DataFrame of pandas, and
+    the cells as text. Raises DatasetError."""
+    place = _PLACE.fullmatch(sheet or "[1]")  # no sheet's name has brackets
+    frame = _excel(path, int(place[2]) - 1 if place and not place[1] else sheet, file)
+    return frame, _texts(frame)
+
+
+def sheets(path: Path, file: str) -> list[list[list[str]]]:
+    """Return the cells of each sheet of a workbook as text. Raises DatasetError."""
+    return [_texts(frame) for frame in _excel(path, None, file).values()]
+
+
+def _excel(path: Path, sheet: str | int | None, file: str) -> Any:
     import pandas
 
     try:
-        frame = pandas.read_excel(path, sheet_name=sheet or 0, header=None, engine="openpyxl")
+        return pandas.read_excel(path, sheet_name=sheet, header=None, engine="openpyxl")
     except Exception as error:  # openpyxl's own, and zipfile's
         raise DatasetError(f"cannot be read as a workbook (.xlsx): {error}", file=file) from None
-    return frame, [["" if value != value or value is None else str(value) for value in row] for row in frame.values]
+
+
+def _texts(frame: Any) -> list[list[str]]:
+    return [["" if value != value or value is None else str(value) for value in row] for row in frame.values]
 
 
 def listed(names: Iterable[str]) -> str:

@@ -131,7 +131,7 @@ def read_instrument(
     _refuse_falling(columns, sheet, rows, "time_s")
     for name in columns.keys() - {"time_s"}:
         called = (export or OWN_NAMES).columns.get(name, name)
-        written = sheet.numbers(sheet.find(called), called)[rows]  # in the file's unit: in mm, -999 m is not a code
+        written = sheet.numbers(sheet.find(called), called, rows)  # in the file's unit: in mm, -999 m is not a code
         if (coded := codes(written) & (np.abs(columns[name]) > _MAX_PLAUSIBLE)).any():
             row = int(np.argmax(coded))
             raise sheet.error(f"{written[row]:g} is a code for a missing value {_REPAIR}", rows[row], name)

@@ -18,7 +18,7 @@ import tomli_w
 from bifa.data.errors import DatasetError
 from bifa.data.export import ROLES, Export, parse_exports, presets, unit_in, unit_in_file, units_for
 from bifa.data.fields import Fields, Source
-from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, workbook
+from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, sheets
 from bifa.files import read_bytes
 from bifa.measure.instruments import CHANNELS
 from lacuna.decimals import number
@@ -28,11 +28,14 @@ _MAX_LINES = 400  # lines that are inspected
 _MAX_BYTES = 1 << 18
 _MAX_HEADER_ROWS = 6
 _COMMON_COLUMNS = ("time_s", "displacement_mm", "displacement_head_mm", "force_N")
-_NAME_PATTERNS = {  # names that a column may have, in the languages of the presets
-    "time_s": r"time|zeit|temps|millis|micros|stamp|frame|x_value|^t$",
-    "displacement": r"displ|exten|stroke|posi|weg|verl|course|cross|^x$|/ x$| x$",
-    "force": r"force|load|kraft|last|charge",
+_NAME_PATTERNS = {  # names that a column may have, in the languages of the presets, the better ones first
+    "time_s": (r"time|zeit|temps", r"millis|micros|stamp|x_value|^sec|^t$", r"frame"),
+    "displacement": (r"displ|d[ée]pl|exten|stroke|travel|weg|verl|course", r"posi", r"cross|^x$|/ x$| x$"),
+    "force": (r"force|load|kraft", r"last|charge"),
 }
+_DAY = r"\d{1,4}[-/.](\d{1,2}|[a-z]{3})[-/.]\d{1,4}"
+_CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?( ?[ap]m)?(Z|[+-]\d\d:?\d\d)?"
+_MOMENT = re.compile(rf"{_DAY}([T ]+{_CLOCK})?|{_CLOCK}", re.ASCII | re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,11 @@ class Look:
 
     def guess(self, name: str) -> str | None:
         """Guess which column may be `name` of the data set; None if no name fits."""
-        kind = "time_s" if name == "time_s" else name.split("_")[0]
-        found = [label for label in self.sheet.labels() if re.search(_NAME_PATTERNS[kind], label, re.IGNORECASE)]
-        return found[0] if found else None
+        for pattern in _NAME_PATTERNS["time_s" if name == "time_s" else name.split("_")[0]]:
+            for label in self.sheet.labels():
+                if re.search(pattern, label, re.IGNORECASE):
+                    return label if self.sheet.has(label) else f"{label} [1]"
+        return None
 
     def unit(self, name: str, column: str) -> str | None:
         """Return the unit that the file itself gives for a column, if it is a possible unit of `name`."""
@@ -97,10 +102,12 @@ def parsed(role: str, table: Mapping[str, Any]) -> Export:
 
 
 def _workbook(path: Path) -> dict[str, Any]:
-    cells = workbook(path, None, str(path))[1][:_MAX_LINES]
-    run, first = _numbers(cells, ".")
+    found = [(*_numbers(cells[:_MAX_LINES], "."), cells) for cells in sheets(path, str(path))]
+    run, first, cells = best = max(found, key=lambda one: one[0])
     _refuse_short(path, run)
-    return {"format": "xlsx"} | _heads(cells[:first], len(cells[first]))
+    place = found.index(best) + 1
+    how = {"format": "xlsx"} | ({"sheet": f"[{place}]"} if place > 1 else {})
+    return how | _heads(cells[:first], len(cells[first]))
 
 
 def _text(path: Path) -> dict[str, Any]:
@@ -118,12 +125,15 @@ def _text(path: Path) -> dict[str, Any]:
     cells = [_split(line, SEPARATORS[separator]) for line in lines[:first]]
     how: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
     how = {key: value for key, value in how.items() if value not in ("comma", ".", "utf-8")}
-    return how | _heads(cells, len(_split(lines[first], SEPARATORS[separator])))
+    return how | _heads(cells, len(_split(lines[first], SEPARATORS[separator])), by_blanks=separator == "space")
 
 
 def _refuse_short(path: Path, run: int) -> None:
     if run < 2:
-        problem = "contains no table of numbers (consecutive rows of equal length): is it an export of a table?"
+        problem = (
+            "contains no table of numbers (consecutive rows of equal length): is it an export of a table? An old "
+            "workbook (.xls) has to be saved as .xlsx"
+        )
         raise DatasetError(problem, file=str(path))
 
 
@@ -134,7 +144,9 @@ def _decoded(path: Path) -> tuple[str, list[str]]:
         raise DatasetError(f"cannot be read ({error.strerror})", file=str(path)) from None
     marked = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
     encoding = "utf-16" if marked else "utf-8" if _is_utf8(raw) else "cp1252"
-    return encoding, raw.decode(encoding, "replace").removeprefix("\ufeff").splitlines()[:_MAX_LINES]
+    text = raw.decode(encoding, "replace").removeprefix("\ufeff")
+    lines = text.split("\n" if "\n" in text else "\r")[:_MAX_LINES]  # as `Sheet` counts them
+    return encoding, [line.rstrip("\r") for line in lines]
 
 
 def _is_utf8(raw: bytes) -> bool:
@@ -156,7 +168,7 @@ def _split(line: str, mark: str) -> list[str]:
 
 
 def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
-    """Length and first line of the longest run of rows with equally many cells, most of them numbers."""
+    """Length and first line of the longest run of rows with equally many cells, most of them numbers or dates."""
     longest, first, run, width = 0, 0, 0, 0
     for place, cells in enumerate(rows):
         here = len(cells) if len(cells) > 1 and _share_of_numbers(cells, decimal) > 0.5 else 0
@@ -168,27 +180,36 @@ def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
 
 
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
-    """Share of numbers among the non-empty cells; 0 if there are fewer than two."""
+    """Share of numbers and dates among the non-empty cells; 0 if there are fewer than two."""
     written = [cell for cell in cells if cell.strip()]
-    found = [number(cell if decimal == "." else cell.replace(".", " ").replace(",", ".")) for cell in written]
-    return sum(value is not None for value in found) / len(written) if len(written) > 1 else 0.0
+    found = sum(_is_number(cell, decimal) or _MOMENT.fullmatch(cell.strip()) is not None for cell in written)
+    return found / len(written) if len(written) > 1 else 0.0
 
 
-def _heads(above: Sequence[Sequence[str]], width: int) -> dict[str, Any]:
-    """Keys that declare the rows of names, and of units, right above the numbers."""
+def _is_number(cell: str, decimal: str) -> bool:
+    return number(cell if decimal == "." else cell.replace(".", " ").replace(",", ".")) is not None
+
+
+def _heads(above: Sequence[Sequence[str]], width: int, by_blanks: bool = False) -> dict[str, Any]:
+    """Keys that declare the rows of names, and of units, right above the numbers and empty rows. `by_blanks`: columns
+    are separated by blanks, as are the words of a name, so only a row of `width` words can be names."""
+    empty = next((n for n, row in enumerate(reversed(above)) if any(cell.strip() for cell in row)), len(above))
     heads: list[Sequence[str]] = []
-    for row in reversed(above):
-        if not 1 < len(row) <= width + 1 or not any(cell.strip() for cell in row) or len(heads) == _MAX_HEADER_ROWS:
+    for row in reversed(above[: len(above) - empty]):
+        fits = len(row) == width if by_blanks else len(row) > 1 and (not heads or len(row) <= width + 1)
+        if not fits or not any(cell.strip() for cell in row) or len(heads) == _MAX_HEADER_ROWS:
             break
         if row[0].strip() and heads and heads[0][0].strip() and not _is_of_units(heads[0]):
             break  # a line of the preamble, since the row below already names the first column
         heads.insert(0, row)
-    units = int(bool(heads) and len(heads) > 1 and _is_of_units(heads[-1]))
+    if not heads:
+        return {"header_rows": 0} | ({"skip_rows": len(above)} if above else {})
+    units = int(len(heads) > 1 and _is_of_units(heads[-1]))
     names = heads[: len(heads) - units]
-    how: dict[str, Any] = {"units_rows": units} if units else {}
+    how: dict[str, Any] = {"units_rows": units + empty} if units + empty else {}
     if len(names) > 1:
         how["header_rows"] = len(names)
-    begin = len(above) - len(heads)
+    begin = len(above) - empty - len(heads)
     label = names[-1][0].strip() if names else ""
     if begin and label and [row[0].strip() for row in above if row].count(label) == 1:
         how["header"] = label

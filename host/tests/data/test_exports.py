@@ -14,8 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bifa.data import DatasetError, read_dataset
-from bifa.data.export import parse_exports, presets, read_export, sync_edges, unit_in
+from bifa.data.export import dated_edges, parse_exports, presets, read_export, sync_edges, unit_in
 from bifa.data.fields import Fields, Source
+from bifa.data.sheet import Sheet
 from bifa.data.write import add_trial
 from bifa.measure.propose import look
 from bifa.toml import parse_toml
@@ -155,6 +156,49 @@ def test_the_strobe_may_be_a_column_or_clock_every_frame(tmp_path):
         edges(strobe, slow)
 
 
+ROWS_OF_ANOTHER = "2,2026-11-25T10:00:00,lost,\n2,2026-11-25T10:00:01,lost,\n"
+
+
+def test_rows_that_do_not_count_neither_begin_the_clock_nor_have_to_be_numbers(tmp_path):
+    """A date's seconds count from the first row read, as do those of the edges in the file beside it."""
+    text = DATED + "where = { id = 1 }\n"
+    rows = "1,2026-11-25T10:00:03,5,6\n1,2026-11-25T10:00:04,7,8\n"
+    (tmp_path / "a.csv").write_text("id,t,x,F\n" + ROWS_OF_ANOTHER + rows)
+    (tmp_path / "a.sync.csv").write_text("sync_time_s\n2026-11-25T10:00:03\n2026-11-25T10:00:04\n")
+    found, sheet, counted = read_export(tmp_path / "a.csv", declared(text), MACHINE)
+    assert [found[key].tolist() for key in MACHINE] == [[0.0, 1.0], [5.0, 7.0], [6.0, 8.0]]
+    edges = dated_edges(declared(text), sheet, counted, Sheet(tmp_path / "a.sync.csv"))
+    assert edges.tolist() == [0.0, 1.0]
+    (tmp_path / "a.sync.csv").write_text("sync_time_s\n2026-11-25T10:00:03\nlate\n")
+    with pytest.raises(DatasetError, match=r"a\.sync\.csv, line 3, .*'late' is not a date"):
+        dated_edges(declared(text), sheet, counted, Sheet(tmp_path / "a.sync.csv"))
+
+
+@pytest.mark.parametrize(
+    ("text", "form"),
+    [
+        ("0,1.5,2\n1,2.5,3\n", "header_rows = 0"),
+        ("log of Monday\n0;1,5;2\n1;2,5;3\n", 'header_rows = 0\nskip_rows = 1\nseparator = ";"\ndecimal = ","'),
+        ("Time (s)  Disp (mm)  F\n 0 1.5  2\n 1 2.5 3 \n", 'header_rows = 0\nskip_rows = 1\nseparator = "space"'),
+        (",x,F\n0,1.5,2\n1,2.5,3\n", ""),
+        ("[s],[mm],[N]\n0,1.5,2\n1,2.5,3\n", "header_rows = 0\nunits_rows = 1"),
+    ],
+)
+def test_columns_without_names_are_known_by_their_places(tmp_path, text, form):
+    places = SIMPLE.replace('"t"', '"[1]"').replace('"x"', '"[2]"').replace('"F"', '"[3]"')
+    found = read(tmp_path, text, places + form)
+    assert [found[key].tolist() for key in MACHINE] == [[0.0, 1.0], [1.5, 2.5], [2.0, 3.0]]
+    with pytest.raises(DatasetError, match=r"lacks the column \[4\]; it has \[1\], "):
+        read(tmp_path, text, places.replace("[3]", "[4]") + form)
+
+
+def test_a_run_that_is_shorter_than_its_neighbor_in_the_sheet_ends_where_it_ends(tmp_path):
+    rows = "0,1,2,,9\n1,2,3,,9\n,,,,9\n,,,,9\n"
+    assert read(tmp_path, "t,x,F,,t\n" + rows, SIMPLE.replace('"t"', '"t [1]"'))["force_N"].tolist() == [2.0, 3.0]
+    lost = read(tmp_path, "t,x,F\n0,,\n1,2,3\n2,,\n")["displacement_mm"]
+    np.testing.assert_array_equal(lost, [np.nan, 2.0, np.nan])
+
+
 def test_a_workbook_comes_in(tmp_path):
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("openpyxl")
@@ -162,6 +206,11 @@ def test_a_workbook_comes_in(tmp_path):
     table = pandas.DataFrame({"t": [0.0, 0.1], "x": [1.0, 2.0], "F": [3.0, 4.0]})
     table.to_excel(path, sheet_name="data", index=False, startrow=2)
     assert read_export(path, export, MACHINE)[0]["force_N"].tolist() == [3.0, 4.0]
+    second = declared(SIMPLE + 'format = "xlsx"\nsheet = "[2]"\n')
+    with pandas.ExcelWriter(path) as book:
+        pandas.DataFrame({"of": ["specimen 1"]}).to_excel(book, sheet_name="results", index=False)
+        table.to_excel(book, sheet_name="values of specimen 1", index=False)
+    assert read_export(path, second, MACHINE)[0]["force_N"].tolist() == [3.0, 4.0]
     table["x"] = [1.0, "n.a."]
     table.to_excel(path, sheet_name="data", index=False, startrow=2)
     with pytest.raises(DatasetError, match=r"a\.xlsx, line 5, column x: 'n\.a\.' is not a number"):
@@ -183,6 +232,7 @@ def test_a_workbook_comes_in(tmp_path):
         ("t,x,x,F\n0,1,2,3\n", r"has the column x more than once \(x, x\).*\"x \[1\]\""),
         ("t,x,F\n0,1,2\n1,2,3,4\n", r"line 3: 4 fields, but 3 columns"),
         ("t;x;F\n0;1;2\n", r"separated by semicolons"),
+        ('t,x,F\n0,1,2\n1,"1,234.5",3\n', r"line 3, column x: '1,234\.5' is not a number; commas between thousands\?"),
     ],
 )
 def test_a_fault_is_named_by_line_column_and_cell(tmp_path, text, said):
@@ -191,8 +241,14 @@ def test_a_fault_is_named_by_line_column_and_cell(tmp_path, text, said):
 
 
 def test_points_in_a_file_with_decimal_commas_are_no_thousands(tmp_path):
-    with pytest.raises(DatasetError, match=r"line 2, column x: '1\.234' is not a number"):
+    with pytest.raises(DatasetError, match=r"line 2, column x: '1\.234' is not a number; .*points between thous"):
         read(tmp_path, "t;x;F\n0,0;1.234;2\n1,0;2,5;3\n", SIMPLE + 'separator = ";"\ndecimal = ","\n')
+
+
+def test_names_with_blanks_are_not_taken_for_more_columns(tmp_path):
+    text = SIMPLE.replace('"t"', '"Time"').replace('"x"', '"Disp"').replace('"F"', '"Time"') + 'separator = "space"\n'
+    with pytest.raises(DatasetError, match=r"line 2: 4 fields, but 6 names: blanks in the names\?.*\[2\]"):
+        read(tmp_path, "Time (s) Disp (mm) F T\n0 1 10 20\n1 2 11 21\n", text)
 
 
 def test_an_encoding_that_is_another_is_said_with_how_to_declare_it(tmp_path):
@@ -207,6 +263,40 @@ def test_an_encoding_that_is_another_is_said_with_how_to_declare_it(tmp_path):
 def test_a_row_of_units_and_the_declaration_have_to_agree(tmp_path):
     with pytest.raises(DatasetError, match=r"line 2, column F: the file says kN, but units.force_N is declared as N"):
         read(tmp_path, "t,x,F\n(s),(mm),(kN)\n0,1,2\n", SIMPLE + "units_rows = 1\n")
+
+
+@pytest.mark.parametrize(
+    ("head", "more"),
+    [
+        ("t,x,F (kN) Run #1\n", ""),
+        ("t,x,F (lbs)\n", ""),
+        ("t,x,F\nTS,mm,kN\n,Smp,Avg\n", "units_rows = 2\n"),
+    ],
+)
+def test_a_unit_is_seen_wherever_the_file_gives_it(tmp_path, head, more):
+    name = head.split("\n")[0].split(",")[2]
+    with pytest.raises(DatasetError, match=r"the file says (kN|lbf), but units.force_N is declared as N"):
+        read(tmp_path, head + "0,1,2\n1,2,3\n", SIMPLE.replace('"F"', f'"{name}"') + more)
+
+
+def test_frames_of_another_rate_than_the_presets_are_refused(tmp_path):
+    path = written(tmp_path, "vicon", {key: RECORD[key] for key in ("time_s", "displacement_mm")})
+    path.write_bytes(path.read_bytes().replace(b"\r\n100\r\n", b"\r\n250\r\n", 1))
+    with pytest.raises(DatasetError, match="lacks the column 100 / Frame; it has 250 / Frame"):
+        read_export(path, by_preset("vicon", "camera"), ("time_s", "displacement_mm"))
+    other = by_preset("vicon", "camera", 'rate_hz = 250\ncolumns = { time_s = "250 / Frame" }\n')
+    found, _, _ = read_export(path, other, ("time_s", "displacement_mm"))
+    np.testing.assert_allclose(found["time_s"], 0.4 * TIME_S, atol=1e-6)
+
+
+def test_an_export_whose_preamble_tells_of_another_unit_is_refused(tmp_path):
+    path = written(tmp_path, "motive", {key: RECORD[key] for key in ("time_s", "displacement_mm")})
+    path.write_bytes(path.read_bytes().replace(b"Units,Meters", b"Units,Millimeters", 1))
+    with pytest.raises(DatasetError, match="no line above the column names contains 'Length Units,Meters'"):
+        read_export(path, by_preset("motive", "camera"), ("time_s", "displacement_mm"))
+    other = by_preset("motive", "camera", 'above = "Length Units,Millimeters"\nunits = { displacement_mm = "mm" }\n')
+    found, _, _ = read_export(path, other, ("time_s", "displacement_mm"))
+    np.testing.assert_allclose(found["displacement_mm"], 1e-3 * RECORD["displacement_mm"], atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -240,7 +330,10 @@ def test_a_declaration_that_is_wrong_is_named_by_line_and_key(text, said):
 
 @pytest.mark.parametrize(
     ("text", "unit"),
-    [("(mm)", "mm"), ("Load [kN]", "kN"), ("sec", "s"), ("Extension (inch)", "in"), ("Time", None), ("Force", None)],
+    [
+        *(("(mm)", "mm"), ("Load [kN]", "kN"), ("sec", "s"), ("Extension (inch)", "in"), ("Time", None)),
+        *(("Time (s) Run #1", "s"), ("Load [N] (filtered)", "N"), ("Force", None), ("N / mm", None)),
+    ],
 )
 def test_units_are_recognized_where_they_are_written(text, unit):
     assert unit_in(text) == unit
@@ -263,6 +356,7 @@ def test_any_number_is_read_to_the_last_bit(values, how, encoding):
 
 FORMS = ['separator = ";"\ndecimal = ","', 'separator = "space"', 'separator = "tab"\nheader = "t"']
 FORMS += ['encoding = "utf-16"', "skip_rows = 2\nheader_rows = 2", "units_rows = 1", "where = { x = 1 }", ""]
+FORMS += ["header_rows = 0"]
 
 
 @settings(max_examples=250)

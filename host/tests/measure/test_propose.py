@@ -81,6 +81,22 @@ def test_a_preset_that_fits_is_offered_and_kept_short(tmp_path):
     assert text == '[known]\nhead_mass_kg = 0.18\n\n[instrument.machine]\npreset = "testxpert"\n'
 
 
+def test_a_column_that_the_preset_does_not_know_is_proposed_by_its_name(tmp_path):
+    path = exported(tmp_path, "bluehill-german", "machine")
+    path.write_bytes(path.read_bytes().replace("Verlängerung".encode("cp1252"), b"Traversenweg"))
+    said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "file", "y")
+    assert said.exit_code == 0, said.output
+    assert read_exports(tmp_path / "bench.toml")["machine"].columns["displacement_mm"] == "Traversenweg"
+
+
+def test_the_head_is_not_proposed_as_the_tail_as_well(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x,y\n0,1,2\n1,2,3\n")
+    answers = ("", "s", "", "mm", "n", "", "mm", "n", "", "file", "y")
+    said = asked(tmp_path / "a.csv", tmp_path, *answers, role="camera")
+    assert said.exit_code == 0, said.output
+    assert "displacement_tail_mm" not in read_exports(tmp_path / "bench.toml")["camera"].columns
+
+
 def test_nothing_is_written_unasked_and_nothing_declared_twice(tmp_path):
     path = exported(tmp_path, "testxpert", "machine")
     said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "file", "n")
@@ -127,6 +143,44 @@ def test_decimal_commas_are_no_separators_however_few_columns_there_are(tmp_path
     np.testing.assert_array_equal(seen.sheet.numbers(columns - 1, ""), [0.25] * 5)
 
 
+ROWS = "0,1,5\n1,2,6\n2,3,7\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "how", "labels"),
+    [
+        (ROWS, {"header_rows": 0}, ["[1]", "[2]", "[3]"]),
+        (f"log of Monday\n\n{ROWS}", {"header_rows": 0, "skip_rows": 2}, ["[1]", "[2]", "[3]"]),
+        (f"t,x,F\n\n{ROWS}", {"units_rows": 1}, ["t", "x", "F"]),
+        (f"t,x,F\n{ROWS}".replace("\n", "\r\r\n"), {}, ["t", "x", "F"]),
+        (f"X,CH1,CH2,Start,Increment,\n{ROWS}", {}, ["X", "CH1", "CH2", "Start", "Increment", "[6]"]),
+        ("Time (s) x F\n" + ROWS.replace(",", " "), {"separator": "space", "header_rows": 0, "skip_rows": 1}, None),
+        ("t,x\n" + "".join(f"2026-11-25 10:00:0{k}.5 PM,{k}\n" for k in range(3)), {}, ["t", "x"]),
+    ],
+)
+def test_every_row_of_numbers_is_seen_and_none_taken_for_names(tmp_path, text, how, labels):
+    (tmp_path / "a.csv").write_bytes(text.encode())
+    seen = look(tmp_path / "a.csv")
+    assert seen.how == how
+    assert len(seen.sheet) == 3
+    assert seen.sheet.labels() == (labels or ["[1]", "[2]", "[3]"])
+
+
+@pytest.mark.parametrize(
+    ("names", "name", "label"),
+    [
+        ("Frame,Time", "time_s", "Time"),
+        ("Body / Rotation / X,Body / Position / X", "displacement_mm", "Body / Position / X"),
+        ("Crosshead absolute,Standard travel", "displacement_mm", "Standard travel"),
+        ("C_1_Force[kN],C_1_Déplacement[mm]", "displacement_mm", "C_1_Déplacement[mm]"),
+        ("Force,Force", "force_N", "Force [1]"),
+    ],
+)
+def test_the_better_of_two_names_is_proposed(tmp_path, names, name, label):
+    (tmp_path / "a.csv").write_text(names + "\n0,1\n1,2\n", encoding="utf-8")
+    assert look(tmp_path / "a.csv").guess(name) == label
+
+
 def test_a_letter_of_an_old_code_page_is_seen_at_the_very_end_of_a_file_as_well(tmp_path):
     rows = "".join(f"{t};{t}\n" for t in range(5))
     (tmp_path / "a.csv").write_bytes(f"Zeit [s];Kraft [N]\n{rows}Ende;3 µ".encode("cp1252"))
@@ -157,9 +211,12 @@ def test_presets_are_listed():
 def test_a_workbook_is_looked_at_as_well(tmp_path):
     pandas = pytest.importorskip("pandas")
     table = pandas.DataFrame(dict(zip(("Time [s]", "Extension [mm]", "Load [kN]"), MACHINE.values(), strict=True)))
-    table.to_excel(tmp_path / "a.xlsx", index=False, startrow=3)
+    with pandas.ExcelWriter(tmp_path / "a.xlsx") as book:
+        pandas.DataFrame({"of": ["a", "b"], "N": [1.0, 2.0]}).to_excel(book, sheet_name="results", index=False)
+        table.to_excel(book, sheet_name="values", index=False, startrow=3)
     said = asked(tmp_path / "a.xlsx", tmp_path, "", "", "", "", "n", "", "", "n", "file", "y")
     assert said.exit_code == 0, said.output
     export = read_exports(tmp_path / "bench.toml")["machine"]
+    assert export.form.sheet == "[2]"
     found, _, _ = read_export(tmp_path / "a.xlsx", export, ("time_s", "force_N"))
     np.testing.assert_allclose(found["force_N"], 1000.0 * MACHINE["force_N"])
