@@ -29,20 +29,28 @@ static_assert(sizeof(Calibration) <= sizeof(ParameterSet), "the settings fit a r
 
 void Commands::begin(StartCause cause) {
   store_.begin();
-  uint8_t payload[sizeof(ParameterSet)];
-  Calibration calibration = {};
-  if (store_.load_settings(payload)) {
-    memcpy(&calibration, payload, sizeof calibration);
-    if (!is_valid(calibration)) calibration = {};
-  }
   running_ = wanted_ = at_power_up();
-  controller_.begin(cause, wanted_, calibration);
+  controller_.begin(cause, wanted_, calibration_at_power_up());
+}
+
+void Commands::poll() {
+  const bool was_busy = store_.busy();
+  store_.poll();
+  if (was_busy && !store_.busy()) controller_.calibrate(calibration_at_power_up());
 }
 
 ParameterSet Commands::at_power_up() {
   ParameterSet set;
   if (!store_.load(kStartPreset, set)) set = factory_preset(0);
   return set;
+}
+
+Calibration Commands::calibration_at_power_up() {
+  uint8_t payload[sizeof(ParameterSet)];
+  if (!store_.load_settings(payload)) return {};
+  Calibration calibration;
+  memcpy(&calibration, payload, sizeof calibration);
+  return is_valid(calibration) ? calibration : Calibration{};
 }
 
 Result Commands::run() {
@@ -157,9 +165,7 @@ Result Commands::forget(const char* name) { return store_.forget(name); }
 
 Result Commands::defaults() {
   const Result result = store_.erase_all();
-  if (result != Result::kOk) return result;
-  controller_.calibrate({});
-  return take_over_soon(factory_preset(0));
+  return result == Result::kOk ? take_over_soon(factory_preset(0)) : result;
 }
 
 Result Commands::zero(bool factory) {
@@ -170,9 +176,7 @@ Result Commands::zero(bool factory) {
   }
   uint8_t payload[sizeof(ParameterSet)] = {};
   memcpy(payload, &calibration, sizeof calibration);
-  const Result result = store_.save_settings(payload);
-  if (result == Result::kOk) controller_.calibrate(calibration);
-  return result;
+  return store_.save_settings(payload);
 }
 
 bool Commands::preset_at(uint8_t index, char* name, bool& stored) {

@@ -46,6 +46,9 @@ class Commands {
   /// Call with each new sample, which shows where in the cycle the robot is.
   void follow(const Sample& sample);
 
+  /// Continues writing the EEPROM. Zero offsets take effect once they are stored, so a failed write changes none.
+  void poll();
+
   // EEPROM commands: Result::kOk while store().busy() means that the result follows later.
   Result save(const char* name);
   Result load(const char* name);
@@ -63,6 +66,7 @@ class Commands {
  private:
   enum class Draft : uint8_t { kNone, kOpen, kSpoilt };
 
+  Calibration calibration_at_power_up();
   void use(const ParameterSet& set);
   Result take_over_soon(const ParameterSet& set);
 

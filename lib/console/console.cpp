@@ -173,6 +173,7 @@ void Console::poll(const LinkCounters& counters) {
   commands_.controller().host_heard();  // its input is not read until the EEPROM has been written
   if (commands_.store().busy()) return;
   waiting_ = false;
+  if (static_cast<CommandId>(command_) == CommandId::kZero) print_offsets();
   answer(commands_.store().result());
 }
 
@@ -387,9 +388,7 @@ void Console::zero() {
   const bool factory = is(1, BIFA_TEXT("factory"));
   if (!factory && !is(1, BIFA_TEXT("confirm"))) return answer_usage();
   print_offsets();
-  const Result started = commands_.zero(factory);
-  if (started == Result::kOk) print_offsets();
-  finish_later(started);
+  finish_later(commands_.zero(factory));
 }
 
 void Console::print_offsets() {

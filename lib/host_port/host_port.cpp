@@ -11,7 +11,7 @@ void HostPort::begin(uint16_t boot_nonce, StartCause cause) {
 }
 
 void HostPort::poll() {
-  commands_.store().poll();
+  commands_.poll();
   session_.poll();
   console_.poll({frames_bad_, receiver_.lost()});
   uint8_t byte;

@@ -165,7 +165,11 @@ void Store::next_copy() {
     marks_[slot_] &= ~kDoomed;
     return;
   }
-  end(Result::kEeprom);
+  if (job_ == Job::kSave && copies_ < kCopies) {
+    copies_ = 0;  // repair() writes the second copy once the old ones have made room
+  } else {
+    end(Result::kEeprom);
+  }
 }
 
 void Store::poll() {
@@ -177,28 +181,28 @@ void Store::poll() {
   }
 }
 
-/// Voids the mark, writes the other bytes, compares all of them, and writes the mark last.
+/// Voids the mark, writes the other bytes, and writes the mark last. Each step first compares all that the earlier ones
+/// wrote, so that a slot with a bad cell is given up at once.
 void Store::step_write() {
   const uint16_t address = slot_address(slot_);
   const uint8_t* bytes = reinterpret_cast<const uint8_t*>(&record_);
+  const uint8_t mark = at_ > sizeof record_ ? kRecordValid : kRecordVoid;
+  bool kept = true;
+  for (uint8_t i = 0; i < at_ && i < sizeof record_; ++i) {
+    kept = kept && eeprom_read(address + i) == (i == 0 ? mark : bytes[i]);
+  }
+  if (!kept) {
+    marks_[slot_] |= kFailed;
+    return next_copy();
+  }
   while (at_ < sizeof record_) {
-    const uint8_t value = at_ == 0 ? kRecordVoid : bytes[at_];
+    const uint8_t value = at_ == 0 ? mark : bytes[at_];
     const uint16_t place = address + at_++;
     if (eeprom_read(place) == value) continue;  // skip unchanged bytes to save wear
     eeprom_write(place, value);
     return;
   }
-  bool kept = true;
-  for (uint8_t i = 1; i < sizeof record_; ++i) kept = kept && eeprom_read(address + i) == bytes[i];
-  if (at_ == sizeof record_ && kept) {
-    ++at_;
-    eeprom_write(address, kRecordValid);
-    return;
-  }
-  if (!kept || eeprom_read(address) != kRecordValid) {
-    marks_[slot_] |= kFailed;
-    return next_copy();
-  }
+  if (at_++ == sizeof record_) return eeprom_write(address, kRecordValid);
   marks_[slot_] |= kTaken;
   if (--copies_ > 0) next_copy();
 }
@@ -212,7 +216,10 @@ void Store::step_void() {
         marks_[slot] &= ~kDoomed;
         continue;
       }
-      if (has(slot, kFailed)) return end(Result::kEeprom);
+      if (has(slot, kFailed)) {
+        if (job_ == Job::kSave) continue;  // the new copies count, since they are newer
+        return end(Result::kEeprom);
+      }
       marks_[slot] |= kFailed;  // cleared if it reads back as void the next time
       eeprom_write(slot_address(slot), kRecordVoid);
       return;

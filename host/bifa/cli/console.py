@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = ("bifa console", "bifa console --port virtual", f"echo show | bifa console --port {EXAMPLE_PORT}")
 
-_LOOK_S = 0.2
+_LOOK_S = 0.02  # less than any useful `host_timeout_s`
 
 
 def console(port: Annotated[str | None, PORT] = None) -> None:

@@ -5,6 +5,7 @@ from bifa.link.transport import Clock
 from bifa.link.uno import Uno
 
 SETTLE_S = 0.05
+CANCEL = b"\x18"  # not text: the Uno refuses the line, unless it ends in `stop`
 LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
 MOVING_COMMANDS = ("run", "hold")
 PARAMETER_COMMANDS = ("set", "load", "defaults")  # these may change `host_timeout_s`
@@ -16,8 +17,8 @@ def is_answer(line: str) -> bool:
 
 
 def settle(uno: Uno, clock: Clock) -> None:
-    """End any unfinished line in the Uno's input, and drop the answer to it."""
-    uno.session.transport.write(b"\n")
+    """Void any line that an earlier program left unfinished in the Uno's input, and drop the answer to it."""
+    uno.session.transport.write(CANCEL + b"\n")
     deadline = clock.now() + SETTLE_S
     while clock.now() < deadline:
         uno.session.poll(0.02)

@@ -157,9 +157,10 @@ class Uno:
         if self._clock.now() >= self._next_exchange_s:
             self.exchange_clocks()
 
-    def _plan_exchanges(self, host_timeout_wire: int) -> None:
+    def _plan_exchanges(self, host_timeout_wire: int, is_pending: bool) -> None:
         timeout_s = from_wire("host_timeout_s", host_timeout_wire or SESSION_TIMEOUT_MS)
-        self._exchange_every_s = min(CLOCK_EVERY_S, timeout_s / 4)
+        longest_s = self._exchange_every_s if is_pending else CLOCK_EVERY_S  # the earlier time-out still counts
+        self._exchange_every_s = min(longest_s, timeout_s / 4)
         self._next_exchange_s = min(self._next_exchange_s, self._clock.now() + self._exchange_every_s)
 
     # -- parameters -------------------------------------------------------------------------------------------
@@ -214,9 +215,9 @@ class Uno:
 
     def _read_set(self) -> tuple[dict[str, int], bool]:
         report = self.session.call("read_set")
-        values = unpack_set(report["set"])
-        self._plan_exchanges(values["host_timeout_s"])
-        return values, bool(report["pending"])
+        values, is_pending = unpack_set(report["set"]), bool(report["pending"])
+        self._plan_exchanges(values["host_timeout_s"], is_pending)
+        return values, is_pending
 
     # -- presets ----------------------------------------------------------------------------------------------
 

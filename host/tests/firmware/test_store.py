@@ -222,6 +222,44 @@ def test_cells_that_keep_nothing_are_passed_over():
     assert bench.load("alpha") == parameter_set(1)
 
 
+@pytest.mark.parametrize("dead", [1, 3, 20, 100, SIZE])
+def test_an_answer_is_true_however_many_cells_keep_what_they_hold(dead):
+    """`ok`: the new content is there after a restart. An error: the old one is. Others are never touched."""
+    for seed in range(40):
+        rng = random.Random(seed)
+        bench = Bench(furnished())
+        known: dict[str, bytes | None] = {name: bench.load(name) for name in bench.names()}
+        known["#settings"] = bench.settings()
+        image = bench.image()
+        for address in rng.sample(range(SIZE), dead):
+            bench.stick(address, image[address])
+        for _ in range(6):
+            name, new = rng.choice([*known]), parameter_set(rng.randrange(10_000))
+            if name == "#settings":
+                result = bench.save_settings(new)
+            elif rng.random() < 0.2:
+                new, result = None, bench.forget(name)
+            else:
+                result = bench.save(name, new)
+            assert result in (OK, EEPROM, NO_PRESET)
+            if result == OK:
+                known[name] = new
+            restarted = Bench(bench.image())
+            assert {n: restarted.load(n) for n in known if n != "#settings"} | {
+                "#settings": restarted.settings()
+            } == known, (seed, name, result)
+
+
+def test_a_dead_eeprom_is_given_up_at_once():
+    """While a typed save lasts, the line is not read; so a save that cannot succeed must not take seconds."""
+    for image in (BLANK, bytes(SIZE), furnished()):
+        bench = Bench(image)
+        for address in range(SIZE):
+            bench.stick(address, image[address])
+        assert bench.save("alpha", parameter_set(99)) == EEPROM
+        assert bench.writes <= SLOTS
+
+
 def test_a_thousand_saves_are_all_readable_and_wear_evenly():
     bench = Bench()
     for name in ("one", "two", "three"):

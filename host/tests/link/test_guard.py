@@ -57,6 +57,20 @@ def test_a_timeout_that_is_chosen_counts_and_is_kept_alive(board, connected, tim
     assert (board.valves, board.state) == (0, "fault")
 
 
+@pytest.mark.parametrize("later", [{"host_timeout_s": 30.0}, {"host_timeout_s": 0.0}, "baseline"])
+def test_a_longer_timeout_that_waits_for_the_boundary_does_not_silence_the_host_before(board, connected, later):
+    connected.upload({"host_timeout_s": 0.3, "period_s": 20.0})
+    connected.run()
+    connected.samples(1.0)
+    if later == "baseline":
+        connected.load(later)
+    else:
+        connected.upload(later)
+    connected.samples(5.0)
+    assert connected.status().is_set_pending
+    assert board.state == "running"
+
+
 @pytest.mark.parametrize("replace", ["set host_timeout_s 0", "load obstacle", "save fast"])
 def test_nothing_ends_the_guard(board, connected, replace):
     """A time-out of 0, a preset without one, or a save (during which the host may be killed) does not disable it."""
@@ -102,12 +116,13 @@ def test_a_command_that_is_killed_leaves_no_valve_on(uno, gait, tmp_path, comman
 
 
 @pytest.mark.real_time
-def test_a_pipe_that_pauses_is_not_taken_for_dead(uno):
+@pytest.mark.parametrize("timeout_s", [0, 0.15])
+def test_a_pipe_that_pauses_is_not_taken_for_dead(uno, timeout_s):
     command = [sys.executable, "-m", "bifa", "console", "--port", uno.device]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as program:
-        program.stdin.write(b"run\n")
+        program.stdin.write(b"set host_timeout_s %g\nrun\n" % timeout_s)
         program.stdin.flush()
-        assert program.stdout.readline() == b"ok\n"
+        assert [program.stdout.readline() for _ in range(3)][1:] == [b"ok\n", b"ok\n"]
         uno.wait(2 * GUARD_S)
         assert uno.board.state == "running"
         program.stdin.close()

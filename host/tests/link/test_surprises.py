@@ -13,6 +13,7 @@ from bifa.link import MismatchError, NoAnswerError, RestartedError, Uno, frames
 from bifa.link.frames import Report
 from bifa.link.session import Hello, Session
 from bifa.link.table import COMMANDS, REPORTS, STATES
+from bifa.link.terminal import settle
 from bifa.live.monitor import Monitor
 from bifa.live.record import HEADER, telemetry_row
 from bifa.printable import printable
@@ -134,6 +135,19 @@ def test_an_interrupted_run_is_not_carried_out_later(board, connected):
     board.write = write
     for _ in range(20):
         assert connected.status().state == "idle"
+
+
+@pytest.mark.parametrize("line", ["run", "hold body positive", "defaults confirm", "load obstacle"])
+def test_a_line_that_an_earlier_program_left_unfinished_is_not_carried_out(board, line):
+    """Not every port restarts the Uno when it is opened."""
+    board.type("save mine")
+    board.write(line.encode())
+    uno = Uno(board, board)
+    uno.connect()
+    settle(uno, board)
+    board.sleep(1.0)
+    assert (board.state, board.valves, uno.get("period_s"), "mine" in uno.presets()) == ("idle", 0, 5.7, True)
+    assert not uno.session.lines, "the answer to it is dropped"
 
 
 def test_a_restart_during_an_interruption_is_told(board, connected):

@@ -44,7 +44,7 @@ struct Bench {
   void wait(uint32_t ms) {
     for (; ms > 0; --ms) {
       if (cells_busy > 0) --cells_busy;
-      commands.store().poll();
+      commands.poll();
       session.poll();
       if (controller.tick(pressed)) {
         RawRound round = {{sums[0], sums[1], sums[2]}, 0};
@@ -333,6 +333,20 @@ void test_a_save_that_fails_is_answered_so() {
   equal(Result::kEeprom, done(1));
   bench.take(MessageId::kMark, 0);
   equal(Result::kOk, done(0));
+}
+
+void test_a_zero_that_cannot_be_stored_changes_no_offset() {
+  Bench bench;
+  bench.connect();
+  bench.sums[0] = 4096 + 40;
+  bench.wait(11000);
+  bench.take(MessageId::kZero, 0, ZeroMessage{0});
+  for (uint16_t ms = 0; ms < 60000 && frames_sent() == 0; ++ms) {
+    memset(cells, 0x55, sizeof cells);  // no cell retains a write
+    bench.wait(1);
+  }
+  equal(Result::kEeprom, done(0));
+  TEST_ASSERT_EQUAL_INT16(0, bench.controller.calibration().offset_mpsi[0]);
 }
 
 // ---- what each command does ----
@@ -627,6 +641,7 @@ void run() {
   RUN_TEST(test_repeats_are_counted_up_to_65535);
   RUN_TEST(test_a_command_that_saves_is_answered_when_that_is_done_and_others_wait);
   RUN_TEST(test_a_save_that_fails_is_answered_so);
+  RUN_TEST(test_a_zero_that_cannot_be_stored_changes_no_offset);
   RUN_TEST(test_hold_takes_its_chamber_and_its_state);
   RUN_TEST(test_clear_releases_a_stop);
   RUN_TEST(test_sets_are_begun_filled_and_committed);
