@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -130,6 +130,7 @@ class VirtualRig:
     instruments: Instruments
     _effects: Mapping[str, Mapping[str, float]]
     _session_seeds: Iterator[int]
+    _instruments_after: Callable[[int], Instruments]
 
     @property
     def clock(self) -> World:
@@ -149,6 +150,11 @@ class VirtualRig:
     def next_session_seed(self) -> int:
         """A new seed for each session: the board would take a key that it has seen before for the old session."""
         return next(self._session_seeds)
+
+    def resume(self, recorded: int) -> None:
+        """Go on with a session of which `recorded` trials exist. They had the noise with which this rig began; with it
+        once more, a repeat would be the exact copy of one of them."""
+        self.instruments = self._instruments_after(recorded)
 
     def open_seal(self) -> dict[str, dict[str, float]]:
         """The robot's effects with their parameters, for comparison once the verdict is known."""
@@ -194,7 +200,6 @@ def open_rig(
     `eeprom`: a file that keeps the EEPROM's contents. `parameters`: plant parameters to replace.
     Raises VirtualRobotError, saying what to do.
     """
-    random = np.random.default_rng([seed, 0x51D])
     numbers, curves, inside = parameters_in(profile), None, dict(effects or {})
     bench = _BENCHES[profile]
     if sealed is not None:
@@ -212,12 +217,17 @@ def open_rig(
     plant = Plant(numbers | {"supply_positive_psi": 0.0}, curves)
     plant.parameters = numbers
     clock_hz = CLOCK_HZ * (1.0 + bench.clock_error)
-    plant.wire(uno, clock_hz, int(random.integers(2**63)), bench.noise.pressure_psi, bench.noise.memory_s)
     world = World(uno, clock_hz)
-    instruments = Instruments(world, plant, bench.noise, bench.wobble, random, bench.clock_resolution_s)
-    instruments.mount("locomotion")
-    transport = VirtualTransport(world, bench.bootloader_s)
-    return VirtualRig(uno, plant, world, transport, instruments, inside, itertools.count(1000 * seed))
+
+    def instruments_after(*recorded: int) -> Instruments:
+        random = np.random.default_rng([seed, 0x51D, *recorded])
+        plant.wire(uno, clock_hz, int(random.integers(2**63)), bench.noise.pressure_psi, bench.noise.memory_s)
+        instruments = Instruments(world, plant, bench.noise, bench.wobble, random, bench.clock_resolution_s)
+        instruments.mount("locomotion")
+        return instruments
+
+    transport, seeds = VirtualTransport(world, bench.bootloader_s), itertools.count(1000 * seed)
+    return VirtualRig(uno, plant, world, transport, instruments_after(), inside, seeds, instruments_after)
 
 
 def _default_image() -> Path:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from bifa.campaign.page import ERROR_COLUMNS, GAIT_NAMES, errors_in_words
+from bifa.campaign.stages import changed_inputs
 from bifa.errors import BifaError
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
 from bifa.report.diagnosis import BASE_MODEL, COMPLETED_MODEL, HELD_OUT, NOISE_FLOOR, RMS, verdict_sentence
@@ -31,6 +32,7 @@ from bifa.robot.gait import Gait, load_gait
 from bifa.robot.parameters import ModelParameter
 
 _SHADES = {"baseline": "quiet", "base": "before", "completed": "after"}
+_NEEDED = {"verdict", "effects", "remainder", "gaits", "prediction_error", "error"}  # of summary.json
 _APART = 2.0  # standard deviations: parameters that differ by more are marked
 
 
@@ -60,14 +62,21 @@ def read_runs(folders: Sequence[Path]) -> list[Campaign]:
 
 def _read(name: str, folder: Path) -> Campaign:
     try:
-        summary = json.loads((folder / "summary.json").read_text())
+        summary = dict(json.loads((folder / "summary.json").read_text()))
+        if missing := sorted(_NEEDED - summary.keys()):
+            raise ValueError(f"it lacks {', '.join(missing)}")
     except FileNotFoundError:
         raise CompareError(
             f"{folder} holds no finished campaign (no summary.json); finish it with: "
             f"bifa campaign --out {shlex.quote(str(folder))}"
         ) from None
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise CompareError(f"{folder / 'summary.json'} is damaged ({error}); rebuild it with --rerun compare") from None
+    if changed := changed_inputs(folder, "compare"):
+        raise CompareError(
+            f"{folder} holds an unfinished campaign: {', '.join(changed)} changed after the last summary; finish it "
+            "with the command that it was begun with"
+        )
     which = ("base", "completed")
     models = {w: load_model(folder / f"model-{w}.toml") for w in which}
     return Campaign(name, summary, models, {w: load_gait(folder / f"gait-{w}.toml") for w in which})

@@ -126,6 +126,12 @@ def run_stages(
             on_end(stage, ran)
 
 
+def changed_inputs(folder: Path, name: str) -> list[str]:
+    """Inputs of the stage `name` that have changed since it ran, as while a campaign is brought up to date."""
+    inputs = _read_records(folder).get(name, {}).get("inputs", {})
+    return [file for file, was in inputs.items() if (folder / file).exists() and digest(folder / file) != was]
+
+
 def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict[str, Any]]) -> None:
     """Raise StageError if the stage would replace something that, by these records, no stage has made."""
     made = {name for record in records.values() for name in record.get("artefacts", {})}
@@ -212,8 +218,7 @@ def _resumed(scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, 
     were all moved."""
     if not stage.resumes or not scratch.exists():
         return {}
-    request_path = scratch / _REQUEST_FILE  # missing after an earlier version, or an interruption at the very start
-    begun = dict(json.loads(request_path.read_text(encoding="utf-8"))) if request_path.exists() else {}
+    begun = _read_request(scratch)
     moved = "artefacts" in begun and not any((scratch / name).exists() for name in stage.makes)
     if moved or not (stage.by_hand or {key: begun.get(key) for key in request} == request):
         shutil.rmtree(scratch)
@@ -229,6 +234,19 @@ def _resumed(scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, 
             "settings, or choose another folder for a new campaign (both are then kept)"
         )
     return begun
+
+
+def _read_request(scratch: Path) -> dict[str, Any]:
+    """What the scratch folder was started with; empty after an earlier version or an interruption at the very start."""
+    path = scratch / _REQUEST_FILE
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        return {}
+    except (ValueError, TypeError) as error:
+        raise StageError(
+            f"{path} is damaged ({error}): delete it to resume with the settings of now, if they are the original ones"
+        ) from None
 
 
 def trials_in(scratch: Path) -> int:
@@ -280,7 +298,8 @@ def _backup_path(target: Path) -> Path:
 
 def _read_records(folder: Path) -> dict[str, Any]:
     try:
-        return dict(json.loads((folder / PROVENANCE).read_text())["stages"])
+        stages = json.loads((folder / PROVENANCE).read_text())["stages"]
+        return {name: dict(record) for name, record in dict(stages).items()}
     except FileNotFoundError:
         return {}
     except (ValueError, KeyError, TypeError) as error:

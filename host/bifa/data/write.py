@@ -17,6 +17,7 @@ from .dataset import Dataset, Trial
 from .errors import DatasetError
 from .layout import FORMAT, SETTINGS, TABLE_FILE
 from .read import read_dataset
+from .sheet import listed
 
 PARTIAL_SUFFIX = ".partial"
 _PROBE = ".probe."  # prefix of the folder where a trial is written and read back before it counts
@@ -80,6 +81,11 @@ class DatasetWriter:
 
     def _recorded(self, head: Dataset) -> Dataset:
         if not (self.partial / TABLE_FILE).exists():
+            if len(list(self.partial.glob("*.csv"))) > 1:
+                raise DatasetError(
+                    f"{self.partial} holds recorded trials, but not the {TABLE_FILE} that lists them: restore it, or "
+                    "move the folder away"
+                )
             return head  # interrupted before the first trial was complete
         earlier = read_dataset(self.partial)
         for what, old, new in (("name", earlier.name, head.name), ("known", earlier.known, head.known)):
@@ -137,6 +143,11 @@ def add_trial(dataset: Dataset, trial: Trial) -> Dataset:
             "set's own form: add to a copy made by write_dataset(folder, read_dataset(...))"
         )
     folder, grown = dataset.folder, replace(dataset, trials=(*dataset.trials, trial))
+    if gone := [old.file for old in dataset.trials if not (folder / old.file).exists()]:
+        raise DatasetError(
+            f"{folder} no longer holds {listed(gone)}, so {trial.file} is not added: was it removed or renamed? Put it "
+            "back, then resume"
+        )
     probe = folder / f"{_PROBE}{secrets.token_hex(4)}"
     write_dataset(probe, replace(dataset, path=None, trials=(trial,)))
     try:

@@ -18,7 +18,7 @@ from rich.status import Status
 from bifa.errors import BifaError
 from bifa.link import RefusedError, Sample, Uno
 from bifa.link.table import CHAMBERS, MARK_PAUSE
-from bifa.live.walk import raise_if_no_reader
+from bifa.live.walk import raise_if_no_reader, stopped_text
 from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.printable import counted
@@ -79,8 +79,8 @@ def record_walks(
             on_event=on_event,
         )
     console.print(
-        f"{out}: {counted(repeats, 'walk')} of {counted(cycles, 'cycle')}, firmware {dataset.provenance['firmware']}; "
-        f"check it with: {shlex.join(['bifa', 'check', str(out)])}",
+        f"{out}: {counted(len(dataset.trials), 'walk')} of {counted(cycles, 'cycle')}, "
+        f"firmware {dataset.provenance['firmware']}; check it with: {shlex.join(['bifa', 'check', str(out)])}",
         soft_wrap=True,
     )
 
@@ -143,6 +143,7 @@ class _TelemetryLog:
                     is_back, known = self.has_begun, self._greet(uno)
                     if self._parameters:
                         uno.upload(self._parameters)
+                    uno.clock_relation.estimate(0.0)  # its first use imports for longer than `host_timeout_s` may be
                     uno.stream(True)
                     marked = uno.mark_strobe()
                     with telemetry_file(path) as file:
@@ -173,10 +174,17 @@ class _TelemetryLog:
         )
 
     def _record(self, uno: Uno, writer: Any, file: TextIO, status: Status, marked: int) -> None:
+        is_walking = False
         try:
             while time.monotonic() < self._end_s:
-                writer.writerows(telemetry_row(uno, sample, marked) for sample in uno.samples(0.5))
+                samples = uno.samples(0.5)
+                writer.writerows(telemetry_row(uno, sample, marked) for sample in samples)
                 file.flush()
+                os.stat(file.name)  # raises if the file was removed or renamed, of which writing takes no notice
+                is_walking = is_walking or any(sample.state == "running" for sample in samples)
+                if is_walking and samples and samples[-1].state != "running":
+                    is_walking = False
+                    self._console.print(f"{stopped_text(uno.status())}; recording continues")
                 if self._parameters:  # at rest, recording continues even if nobody reads the output
                     raise_if_no_reader()
                 status.update(f"recording  {uno.counters.text()}")
@@ -217,11 +225,14 @@ def telemetry_file(path: Path) -> Iterator[TextIO]:
             raise RecordingError(
                 f"{path} cannot be written ({error.strerror or error}); no samples were kept"
             ) from None
-        whole = path.read_bytes()
-        os.truncate(path, whole.rfind(b"\n") + 1)
+        why = f"{path} cannot be written any further ({error.strerror or error})"
+        try:
+            whole = path.read_bytes()
+            os.truncate(path, whole.rfind(b"\n") + 1)
+        except OSError:
+            raise RecordingError(f"{why}, nor read: was it removed or renamed?") from None
         raise RecordingError(
-            f"{path} cannot be written any further ({error.strerror or error}); the {max(whole.count(10) - 1, 0)} "
-            "samples so far are kept: free some space and record again"
+            f"{why}; the {max(whole.count(10) - 1, 0)} samples so far are kept: free some space and record again"
         ) from None
 
 

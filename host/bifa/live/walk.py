@@ -7,7 +7,7 @@ import select
 import sys
 from collections.abc import Callable
 
-from bifa.link import Clock, LinkError, Uno
+from bifa.link import Clock, LinkError, Status, Uno
 from bifa.link.table import CHAMBERS
 from bifa.live.rounds import Pace
 
@@ -28,13 +28,16 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
         raise_if_no_reader()
         status = uno.status()
         if status.state != "running":
-            raise LinkError(
-                f"the robot stopped walking (state: {status.state}, fault: {status.fault}); see bifa console"
-            )
+            raise LinkError(f"{stopped_text(status)}; see bifa console")
         walked_s = clock.now() - began_s
         pressures = "  ".join(f"{name} {psi:+.1f}" for name, psi in zip(CHAMBERS, status.pressure_psi, strict=True))
         on_progress(f"walking: {walked_s:.0f}{until} s, cycle {int(walked_s / period_s) + 1}, psi: {pressures}")
         pace.wait()
+
+
+def stopped_text(status: Status) -> str:
+    """Say that the robot no longer walks, and why."""
+    return f"the robot stopped walking (state: {status.state}, fault: {status.fault})"
 
 
 def raise_if_no_reader() -> None:

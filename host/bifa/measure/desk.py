@@ -13,6 +13,7 @@ import os
 import queue
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 ASKS, ANSWER = "next.toml", "answer"
 _MAX_ANSWER_BYTES = 4096  # bytes of an answer in a file
+_WRITTEN_S = 0.05  # longest time from the creation of a file with an answer until it is written
 STOP = ("q", "quit", "stop", "!")  # accepted at any question, and between questions
 _END = None
 
@@ -138,6 +140,8 @@ def _is_stop(line: str) -> bool:
 
 def _from_file(path: Path) -> str | None:
     try:
+        if not path.stat().st_size:
+            time.sleep(_WRITTEN_S)  # it may have been created just now, and hold a stop in a moment
         text = path.read_bytes()[:_MAX_ANSWER_BYTES].decode("utf-8", "replace").strip()
         path.unlink()
     except OSError:

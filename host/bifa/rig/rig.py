@@ -23,6 +23,7 @@ class Rig(Protocol):
     """A transport and a clock that belong together, and the bench's instruments, if any.
 
     `known`: values measured directly on this rig's robot, by the model's names (`head_mass_kg`); may be empty.
+    `resume(recorded)`, optional: called where an interrupted session goes on that has recorded so many trials.
     """
 
     transport: Transport

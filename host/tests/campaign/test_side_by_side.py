@@ -1,11 +1,13 @@
 """Campaigns side by side: their differences are shown, and a folder that is not a campaign's is refused."""
 
+import json
 import re
 
 import pytest
 
 from bifa.campaign.page import GAIT_NAMES
 from bifa.campaign.side_by_side import CompareError, compare_page, parameter_table, read_runs, verdict_table
+from bifa.campaign.stages import PROVENANCE, digest
 from bifa.report.page import render
 from tests.report import sample
 
@@ -57,6 +59,19 @@ def test_what_is_no_finished_campaign_is_refused_with_what_to_do(tmp_path):
         read_runs([sample.finished(tmp_path / "a"), tmp_path / "b"])
     with pytest.raises(CompareError, match="two"):
         read_runs([tmp_path / "a"])
-    (tmp_path / "a" / "summary.json").write_text("{")
-    with pytest.raises(CompareError, match="damaged"):
-        read_runs([tmp_path / "a", tmp_path / "a"])
+    for text in ("{", "[]", "null", '{"verdict": "none"}'):
+        (tmp_path / "a" / "summary.json").write_text(text)
+        with pytest.raises(CompareError, match=r"damaged .*--rerun compare"):
+            read_runs([tmp_path / "a", tmp_path / "a"])
+
+
+def test_a_campaign_interrupted_while_it_was_brought_up_to_date_is_refused(tmp_path):
+    """Its summary is about an earlier model."""
+    runs = [sample.finished(tmp_path / name) for name in "ab"]
+    model = tmp_path / "b" / "model-completed.toml"
+    record = {"inputs": {model.name: digest(model), "bench": "of a folder that is kept elsewhere"}}
+    (tmp_path / "b" / PROVENANCE).write_text(json.dumps({"stages": {"compare": record}}))
+    assert len(read_runs(runs)) == 2
+    model.write_text(model.read_text() + "\n")
+    with pytest.raises(CompareError, match=r"b holds an unfinished campaign: model-completed\.toml changed after"):
+        read_runs(runs)

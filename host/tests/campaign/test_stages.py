@@ -88,8 +88,12 @@ def test_folders_are_artefacts_too_and_provenance_is_the_same_for_the_same_setti
 
 @pytest.mark.parametrize(
     ("name", "text", "told"),
-    [(PROVENANCE, "{", "choose another folder"), ("dataset.toml", "mine", "is a data set; choose another folder")],
-    ids=["a damaged provenance", "a data set"],
+    [
+        (PROVENANCE, "{", "choose another folder"),
+        (PROVENANCE, '{"stages": {"measure": 5}}', "choose another folder"),
+        ("dataset.toml", "mine", "is a data set; choose another folder"),
+    ],
+    ids=["a damaged provenance", "a damaged record in it", "a data set"],
 )
 def test_a_folder_that_is_none_of_a_campaign_is_refused_with_advice(tmp_path, name, text, told):
     (tmp_path / name).write_text(text)
@@ -210,6 +214,16 @@ def test_what_somebody_has_begun_to_measure_is_neither_mixed_nor_lost(tmp_path, 
     monkeypatch.setattr("bifa.__version__", "9.9")
     run_stages(tmp_path, [stopping(log, {"quick": True}, by_hand=True)])
     assert log == [[], ["trial_1"]]
+
+
+@pytest.mark.parametrize("text", ["", "{", "null", '"x"'])
+def test_a_damaged_record_of_what_was_begun_is_told(tmp_path, text):
+    with pytest.raises(KeyboardInterrupt):
+        run_stages(tmp_path, [stopping([], {"quick": True}, by_hand=True)])
+    (tmp_path / ".measure-unfinished" / "asked.json").write_text(text)
+    with pytest.raises(StageError, match=r"asked\.json is damaged .*delete it to resume"):
+        run_stages(tmp_path, [stopping([], {"quick": True}, by_hand=True)])
+    assert (tmp_path / ".measure-unfinished" / "trial_1").exists()
 
 
 def test_settings_that_differ_are_refused_with_what_would_be_lost_and_what_would_not(tmp_path):

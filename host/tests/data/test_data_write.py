@@ -144,6 +144,27 @@ def test_an_interrupted_add_leaves_the_session_as_it_was(tmp_path, monkeypatch):
     assert [trial.repeat for trial in resumed.finish().trials] == [1, 2]
 
 
+def test_a_session_whose_folder_is_renamed_meanwhile_is_not_split_in_two(tmp_path):
+    writer = DatasetWriter(tmp_path / "day", "moved")
+    writer.add(make_trial(repeat=1))
+    writer.partial.rename(tmp_path / "elsewhere")
+    with pytest.raises(DatasetError, match=r"no longer holds .*_1\.csv, so .*_2\.csv is not added.*Put it back"):
+        writer.add(make_trial(repeat=2))
+    (tmp_path / "elsewhere").rename(writer.partial)
+    resumed = DatasetWriter(tmp_path / "day", "moved", resume=True)
+    resumed.add(make_trial(repeat=2))
+    assert len(resumed.finish().trials) == 2
+
+
+def test_trials_that_are_not_listed_any_more_are_not_recorded_over(tmp_path):
+    writer = DatasetWriter(tmp_path / "day", "no table")
+    for repeat in (1, 2):
+        writer.add(make_trial(repeat=repeat))
+    (writer.partial / "dataset.toml").unlink()
+    with pytest.raises(DatasetError, match=r"holds recorded trials, but not the dataset\.toml that lists them"):
+        DatasetWriter(tmp_path / "day", "no table", resume=True)
+
+
 def test_settings_stay_keys_of_the_trial(tmp_path):
     trial = make_trial("anchor_pull", extra={"load_cell_N_m": 4800.0, "direction": "backward", "room_degC": 21.0})
     folder = write_dataset(tmp_path / "set", Dataset(None, "settings", {}, (trial,)))

@@ -205,6 +205,14 @@ def test_a_page_of_an_earlier_server_says_so_and_still_stops(monitor, tab):
     assert float(page.locator("#alarm").evaluate("box => parseFloat(getComputedStyle(box).fontSize)")) > 20
     stop_on(page)
     assert bifa.uno.board.valves == 0
+    page.goto(bifa.url)  # as the page asks; only what follows the # differs
+    expect(page.get_by_role("button", name="Release the stop")).to_be_enabled()
+
+
+def test_an_address_copied_with_the_rest_of_its_line_is_understood(walking, tab):
+    page = tab(walking.url + "   (Ctrl-C closes it and stops the robot)")
+    page.get_by_label("When the last page closes").uncheck()
+    page.get_by_text("the robot keeps going").wait_for()
 
 
 def test_two_tabs_show_the_same(monitor, tab):

@@ -216,6 +216,20 @@ def usb(device: str, serial_number: str | None) -> SimpleNamespace:
     return SimpleNamespace(device=device, description="Uno", vid=0x2341, pid=0x0043, serial_number=serial_number)
 
 
+def test_a_recording_keeps_a_short_timeout_alive_and_says_that_the_robot_stopped(uno, gait, tmp_path):
+    with Path(gait).open("a", encoding="utf-8") as file:
+        file.write("host_timeout_s = 0.4\n")
+    out = str(tmp_path / "out")
+    with Terminal(tmp_path, "record", "--port", uno.device, "--out", out, "--gait", gait) as terminal:
+        terminal.until(lambda: uno.board.valves != 0)
+        uno.wait(1.5)
+        assert uno.board.state == "running"
+        uno.board.write(b"!")
+        terminal.sees("the robot stopped walking (state: stopped, fault: none); recording continues")
+        terminal.presses("\x03")
+        assert terminal.exit_status() == 0
+
+
 def test_a_killed_recording_keeps_its_rows_and_stops_the_robot(uno, gait, tmp_path):
     out = tmp_path / "out"
     arguments = ["record", "--out", str(out), "--port", uno.device, "--gait", gait]

@@ -8,6 +8,7 @@ from concurrent.futures import Future
 import pytest
 from wsproto.events import BytesMessage, TextMessage
 
+from bifa.live.web import server
 from bifa.live.web.gate import LARGEST_MESSAGE, MAX_STRANGERS
 from bifa.live.web.server import LivePage, served
 from bifa.robot import nominal
@@ -176,6 +177,23 @@ def test_a_page_may_come_while_the_last_reports_are_waited_for(live):
     live.pages.add(Slow())
     live.flush(0.1)
     assert len(live.pages) > 1
+
+
+def test_a_robot_that_begins_to_walk_after_the_last_page_was_closed_is_stopped(live, page, monkeypatch):
+    """As by a request that a bad cable delayed."""
+    monkeypatch.setattr(server, "_RELOAD_WINDOW_S", 0.1)
+    stranger, owner = page(None), page()
+    owner.state()
+    live.tell({"robot": "idle"}, [])
+    owner.close()
+    time.sleep(0.5)
+    live.tell({"robot": "running"}, [])
+    stranger.until(lambda state: state["robot"] == "running")
+    assert live.pilot.stops == ["the last page was closed"]
+    page().state()
+    live.tell({"robot": "running", "warning": "none"}, [])
+    stranger.until(lambda state: "warning" in state)
+    assert len(live.pilot.stops) == 1, "somebody watches again"
 
 
 def test_every_page_is_told_the_same(live, page):

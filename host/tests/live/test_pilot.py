@@ -78,6 +78,27 @@ def test_a_stop_comes_before_what_was_asked_and_is_confirmed():
     assert board.valves == 0
 
 
+@pytest.mark.parametrize("is_early", [True, False], ids=["before the Uno answers", "while the gait is sent"])
+def test_a_stop_keeps_a_robot_that_is_about_to_walk_from_walking(is_early):
+    board, reports = Board(), []
+    pilot = Pilot()
+
+    def begin(uno):
+        uno.upload({"period_s": 4.0})
+        if not is_early:
+            pilot.stop()
+            uno.send_stop()  # the stopper's thread may be late
+        uno.run()
+
+    if is_early:
+        with pytest.raises(NotConnectedError, match="has not answered yet"):
+            pilot.stop().result(0)
+    pilot.fly(Uno(board, board), board, lambda report, samples: reports.append(report), 1.0, begin)
+    assert {report["robot"] for report in reports if "robot" in report} == {"stopped"}
+    assert reports[-1]["stopped"]["is_confirmed"]
+    assert reports[-1]["parameters"]["period_s"] == pytest.approx(4.0)
+
+
 def test_a_stop_that_finds_the_port_gone_leaves_nobody_waiting():
     board, asked = Board(), []
     uno = Uno(board, board)

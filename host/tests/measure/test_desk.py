@@ -2,6 +2,7 @@
 
 import os
 import sys
+import threading
 import time
 import tomllib
 from pathlib import Path
@@ -153,6 +154,19 @@ def test_a_stop_while_nothing_is_asked_counts_at_once(terminal, tmp_path):
     watching.ask("start", "Start it.")
     with pytest.raises(KeyboardInterrupt):
         watching.answer()
+
+
+@pytest.mark.parametrize("is_asking", [True, False])
+def test_a_stop_whose_file_is_still_being_written_is_no_enter(monkeypatch, tmp_path, is_asking):
+    monkeypatch.setattr(sys, "stdin", None)
+    desk = mounting(watch=tmp_path)
+    desk.is_asking = is_asking
+    (tmp_path / "answer").touch()  # as a script's `open` does
+    writer = threading.Timer(0.01, (tmp_path / "answer").write_text, ["q\n"])
+    writer.start()
+    with pytest.raises(KeyboardInterrupt):
+        desk.answer() if is_asking else desk.attend()
+    writer.join()
 
 
 def test_attending_does_not_take_the_answer_to_what_is_asked(terminal):

@@ -141,6 +141,24 @@ def test_an_interrupted_session_goes_on_and_is_never_written_over(rig, tmp_path)
         run(rig, tmp_path / "day", plan)
 
 
+@pytest.mark.uno
+def test_a_repeat_recorded_after_an_interruption_is_no_copy_of_the_first(tmp_path):
+    """A virtual rig that is opened again would begin with the same noise."""
+    plan = (PULL, replace(PULL, repeat=2))
+
+    def interrupt(event):
+        if event.number == 2:
+            raise KeyboardInterrupt
+
+    with open_rig("virtual", seed=3) as rig, pytest.raises(KeyboardInterrupt):
+        run(rig, tmp_path / "day", plan, on_event=interrupt)
+    with open_rig("virtual", seed=3) as rig:
+        one, other = run(rig, tmp_path / "day", plan).trials
+    for name in ("displacement_mm", "force_N", "pressure_psi"):
+        count = min(len(one.time_s), len(other.time_s))
+        assert np.mean(one.columns[name][:count] == other.columns[name][:count]) < 0.5
+
+
 def test_a_rig_without_instruments_says_what_to_do():
     with pytest.raises(BifaError, match=r"this port has no instruments.*--instrument"):
         bench_of(SimpleNamespace(instruments=None))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bifa.errors import BifaError
-from bifa.link import Clock, LinkError, Sample, StillMovingError, Uno
+from bifa.link import Clock, LinkError, RefusedError, Sample, StillMovingError, Uno
 from bifa.link.table import CHAMBERS
 from bifa.live.cycle_speed import CycleSpeed
 from bifa.live.rounds import Latest, Pace
@@ -79,6 +79,7 @@ class Pilot:
         self._stop: Future[Any] | None = None  # requested, and not yet confirmed
         self._lock = threading.Lock()
         self._stopper: Stopper | None = None
+        self._stopped_early = ""  # by whom, while the robot had not answered; it might not have heard that stop
         self._is_flying = False
         self._ended = "the robot has not answered yet"
         self.stopped: dict[str, Any] | None = None
@@ -107,10 +108,11 @@ class Pilot:
             self._requests.clear()
             future = self._stop or Future()
             if not self._is_flying:
+                self._stopped_early = by
                 future.set_exception(NotConnectedError(self._ended))
             elif self._stop is None:
                 self._stop = future
-                self.stopped = {"by": by, "at": wall_clock(), "is_confirmed": None, "why": ""}
+                self.stopped = _requested_stop(by)
         for one in dropped:
             one.cancel()
         return future
@@ -138,7 +140,7 @@ class Pilot:
                 uno.connect()
                 self._take_off(came_back)
                 try:
-                    begin(uno)
+                    self._begin(uno, begin)
                     uno.stream(True)
                     _Flight(self, uno, clock, tell, position_mm).follow(duration_s)
                 except (LinkError, ConnectionError) as error:  # tell the pages before the stop is tried
@@ -160,7 +162,21 @@ class Pilot:
         with self._lock:
             self._is_flying = True
             self.stopped = _spontaneous_stop(came_back) if came_back else None
+            if self._stopped_early and not came_back:
+                self._stop = Future()
+                self.stopped = _requested_stop(self._stopped_early)
+            self._stopped_early = ""
             self._ended = "bifa monitor has ended; the robot was stopped"
+
+    def _begin(self, uno: Uno, begin: Callable[[Uno], None]) -> None:
+        """Call `begin(uno)`. Somebody who stops the robot before or meanwhile keeps it from walking."""
+        if self._stop is not None:
+            uno.stop()
+        try:
+            begin(uno)
+        except RefusedError:
+            if self._stop is None:
+                raise
 
     def _land(self) -> None:
         """Refuse all further requests."""
@@ -298,6 +314,10 @@ class _Flight:
                 if shown and is_seen:
                     shown[-1]["mm"] = ends_mm["head"]
         return report, shown
+
+
+def _requested_stop(by: str) -> dict[str, Any]:
+    return {"by": by, "at": wall_clock(), "is_confirmed": None, "why": ""}
 
 
 def _spontaneous_stop(why: str) -> dict[str, Any]:

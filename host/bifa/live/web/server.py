@@ -123,6 +123,7 @@ class LivePage:
         self.token = secrets.token_urlsafe(16)
         self.gate = Gate()
         self.pages: set[OpenPage] = set()
+        self._is_left = False  # the last page was closed, and none has come back
         self._numbers = itertools.count(1)
         self.loop: asyncio.AbstractEventLoop | None = None  # the server's, which sends to the pages
         self._predictor = ThreadPoolExecutor(1, "predictor", lower_priority)
@@ -172,6 +173,7 @@ class LivePage:
     def _take_report(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
         """Take over the robot's part of the state."""
         self._change(changes, samples)
+        self._stop_if_left()
         if self.state.content["draft"] is None and "parameters" in changes:
             self._draft(_of_gait(changes["parameters"]), by=0)
 
@@ -224,6 +226,7 @@ class LivePage:
         you = {"number": page.number, "is_owner": page.is_owner, "is_stale": bool(given) and not page.is_owner}
         page.tell({"you": you} | self.state.whole())
         self.pages.add(page)
+        self._is_left = self._is_left and not page.is_owner
         sending = asyncio.create_task(_send(socket, page))
         try:
             while True:
@@ -240,9 +243,14 @@ class LivePage:
                 asyncio.get_running_loop().call_later(_RELOAD_WINDOW_S, self._closed)
 
     def _closed(self) -> None:
-        """Stop a moving robot if the last page was closed and none has come back. A robot at rest is left alone."""
+        self._is_left = not self.is_watched()
+        self._stop_if_left()
+
+    def _stop_if_left(self) -> None:
+        """Stop a robot that moves, or that a late request sets in motion, after the last page was closed. A robot at
+        rest is left alone."""
         moves = self.state.content["robot"] in MOVING
-        if moves and self.state.content["stops_when_closed"] and not self.is_watched():
+        if self._is_left and moves and self.state.content["stops_when_closed"]:
             self.pilot.stop("the last page was closed").add_done_callback(_ignore_result)
 
     # -- asking -----------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 "use strict";
 (() => {
-  const token = location.hash.slice(1);
+  const token = /^#?([\w-]*)/.exec(location.hash)[1]; // without what was copied from the terminal after the address
+  addEventListener("hashchange", () => location.reload()); // another address of the same page is not loaded by itself
   const palettes = JSON.parse(document.getElementById("palettes").textContent);
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const names = ["state", "clock", "alarm", "said", "stop", "plot", "unsent", "predicted", "speed", "link", "closing", "preset", "presets", "revert"];
