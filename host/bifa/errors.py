@@ -1,5 +1,7 @@
 """Base class of all errors that bifa anticipates; their texts say what is wrong and what to do."""
 
+import numbers
+
 from bifa.printable import printable
 
 
@@ -12,6 +14,7 @@ class BifaError(Exception):
 
 def check_range(error: type[BifaError], name: str, value: float, lower: float, upper: float, unit: str = "") -> None:
     """Raise `error`, naming the range, unless `value` is a finite number within it."""
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not lower <= value <= upper:  # also refuses NaN, and integers too large for a float
-        raise error(f"{name} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):  # NumPy's numbers are Real, too
+        raise error(f"{name} = {value!r} is not a number")
+    if not lower <= value <= upper:  # also refuses NaN, and integers too large for a float
+        raise error(f"{name} = {value} is outside its range {lower:g} to {upper:g} {unit}".rstrip())

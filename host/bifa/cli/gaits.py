@@ -35,6 +35,8 @@ def gaits(
     console = Console()
     names = [library.checked(name) for name in only] or list(library.NAMES)
     if make:
+        if out is None:
+            requires("--out", model=model)  # the package's gaits are the nominal robot's
         folder = out or library.FOLDER
         check_targets(folders=(folder,))
         with stoppable(lambda: f"the gaits listed above are in {folder}"):

@@ -207,7 +207,5 @@ def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folde
     draw_chart(front_chart(found, (optimum.nominal_mm_s, optimum.quantile_mm_s)), folder / "front.png")
     shown = {"baseline": BASELINE, **other}
     speeds = distribution(pool, robots, gait_rows(list(shown.values())), metric)
-    draw_chart(
-        distribution_chart(optimum, dict(zip(shown, speeds, strict=True))), folder / "distribution.png", width_in=6.4
-    )
+    draw_chart(distribution_chart(optimum, dict(zip(shown, speeds, strict=True))), folder / "distribution.png")
     return reasons(before, after)

@@ -89,7 +89,9 @@ def simulate(
         return
     chosen = chosen.with_values({"tail_mass_kg": chosen["tail_mass_kg"] + payload})
     with console.status("simulating"):
-        from bifa.simulate import Supports, gait_rows, obstacles, speeds, terrain, walk
+        import numpy as np
+
+        from bifa.simulate import SimulationError, Supports, gait_rows, obstacles, speeds, terrain, walk
 
         ahead = obstacles(obstacle) if obstacle else ()
         supports = Supports(_BUCKLING_N if buckling is None else buckling)
@@ -98,13 +100,15 @@ def simulate(
             place["terrain"] = terrain(ahead, supports)
         record = walk(chosen, file.gait, cycles, **place)
         progress = speeds(chosen, gait_rows([file.gait]), cycles, 1e-6, **place)
+    if not (np.isfinite(record["displacement_head_mm"]).all() and np.isfinite(progress.advance_m).all()):
+        raise SimulationError(f"{chosen.name} cannot be simulated: a curve or a value is unlike any robot's")
     _print_walk(console, chosen, file.gait, progress)
     if ahead:
         _print_passing(console, chosen, file.gait, ahead, supports, inclination)
     if not (obstacle or inclination):
         _print_prediction(console, chosen, file.gait)
     if out:
-        _write_csv(out, record.columns)
+        write_csv(out, record.columns)
         console.print(f"channels: {out}")
     if pictures:
         from bifa.report.walks import SIMULATED, Walk, draw_walks
@@ -211,11 +215,12 @@ def _print_obstacles(console: "Console", model: "Model", fast: "Gait") -> None:
     console.print(table)
 
 
-def _write_csv(path: Path, columns: "Mapping[str, np.ndarray]") -> None:
+def write_csv(path: Path, columns: "Mapping[str, np.ndarray]") -> None:
+    """Write columns, arrays of shape (n,), by name."""
     import numpy as np
 
     from bifa.files import written
 
     rows = np.column_stack(list(columns.values()))
     with written(path) as aside:
-        np.savetxt(aside, rows, "%.6g", delimiter=",", header=",".join(columns), comments="")
+        np.savetxt(aside, rows, "%.9g", delimiter=",", header=",".join(columns), comments="")

@@ -25,8 +25,17 @@ def modules() -> Mapping[str, ModuleType]:
 
 @cache
 def library() -> Mapping[str, PhysicalEffect]:
-    """All effects by name."""
-    return MappingProxyType({name: module.EFFECT for name, module in modules().items()})
+    """All effects by name. Raises EffectError for a file that declares none of its own name."""
+    return MappingProxyType({name: _declared(name, module) for name, module in modules().items()})
+
+
+def _declared(name: str, module: ModuleType) -> PhysicalEffect:
+    effect = getattr(module, "EFFECT", None)
+    if not isinstance(effect, PhysicalEffect) or effect.name != name or not name.isidentifier():
+        raise EffectError(f"{name}.py must define EFFECT = PhysicalEffect(name={name!r}, ...), a name without hyphens")
+    if not effect.sizes:
+        raise EffectError(f"{name} does not act: no parameter is marked size=True")
+    return effect
 
 
 def complete(name: str, values: Mapping[str, float]) -> dict[str, float]:

@@ -8,6 +8,7 @@ import numpy as np
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, distribution, on_model
 from bifa.gait.pool import Simulations
+from bifa.gait.settling import STANDING_MM_S
 from bifa.ranges import RANGES
 from bifa.robot.gait import Gait
 from bifa.simulate import Plant, gait_rows
@@ -20,7 +21,8 @@ _REACH = {"period_s": 0.15, "psi12_deg": 40.0, "psi13_deg": 40.0, "duty_body": 0
 class Scan:
     """Speed along one gait parameter, the others held: `values` (n,), `nominal_mm_s` and `quantile_mm_s` (n,).
 
-    room: (lower, upper) limits around the gait's own value within which the quantile stays above 90 % of the gait's.
+    room: (lower, upper) limits around the gait's own value within which the quantile stays above 90 % of the gait's;
+    equal if that is standing still.
     """
 
     name: str
@@ -64,7 +66,7 @@ def sensitivity(
 
 def _room(values: np.ndarray, quantile: np.ndarray) -> tuple[float, float]:
     middle = len(values) // 2
-    good = quantile >= 0.9 * quantile[middle]
+    good = (quantile >= 0.9 * quantile[middle]) & (quantile[middle] >= STANDING_MM_S)
     low = high = middle
     while low > 0 and good[low - 1]:
         low -= 1

@@ -49,7 +49,7 @@ _GIVEN_BY = {
     "head_segment_mass_kg": "a balance",
     "tail_mass_kg": "a balance (a step response does not determine the moving mass)",
     "small_mass_kg": "a balance (a step response does not determine the moving mass)",
-    "wall_stiffness_N_m": "pressing a head against a force gauge (a pull cannot separate it from mu and x_w)",
+    "wall_stiffness_N_m": "pressing a head against a force gauge (a pull cannot separate it from friction and offset)",
     "wall_damping_Ns_m": "an impact test at 1 kHz or more",
 }
 

@@ -42,7 +42,11 @@ class Axis:
             return None
         low, high = self.range
         decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
-        return [tick for tick in np.outer(decades, (1.0, 2.0, 5.0)).ravel().tolist() if low <= tick <= high]
+        coarse, fine = (
+            [tick for tick in np.outer(decades, steps).ravel().tolist() if low <= tick <= high]
+            for steps in ((1.0, 2.0, 5.0), (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 7.0))
+        )
+        return coarse if len(coarse) > 2 else fine
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, Literal
 
 from bifa.report.chart import Axis, Chart, Key, Panel, Series
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 
 _PER_INCH = 75.0  # pixels of a chart per inch
+_LETTERS_PER_INCH = 12.5  # of a column's title
 _DASHES: dict[str, Literal["--", ":"]] = {"dashed": "--", "dotted": ":"}
 
 
@@ -37,7 +39,7 @@ def draw_chart(chart: Chart, path: Path, width_in: float = 9.6) -> None:
         for number, column in enumerate(chart.columns):
             first = number // across * len(heights)
             mine = axes[first : first + len(column.panels), number % across]
-            mine[0].set_title(column.title, loc="left")
+            mine[0].set_title(fill(column.title, round(_LETTERS_PER_INCH * width_in / across)), loc="left")
             for axis, panel in zip(mine, column.panels, strict=True):
                 axis.set_visible(True)
                 _draw(axis, panel)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,26 @@ from bifa.report.chart import Axis, Column, Series
 
 def as_plot(column: Column, height: int) -> list[dict[str, Any]]:
     """Convert the panels of a column, from the top, to plain types. `keys` of a curve are those that switch it."""
+    reach = _shared_reach(column)
     return [
         {
             "height": round(panel.height * height),
-            "x": _axis(panel.x if panel is column.panels[-1] else Axis(range=panel.x.range, log=panel.x.log)),
+            "x": _axis(replace(panel.x if panel is column.panels[-1] else Axis(log=panel.x.log), range=reach)),
             "y": _axis(panel.y),
             "curves": [_curve(series) for series in panel.series],
             "rules": [{"along": along, "place": place, "label": label} for along, place, label in panel.rules],
         }
         for panel in column.panels
     ]
+
+
+def _shared_reach(column: Column) -> tuple[float, float] | None:
+    """Range of the x axis that the panels of a column share; None for a single panel, which finds its own."""
+    own = column.panels[-1].x.range
+    if own is not None or len(column.panels) == 1:
+        return own
+    x = np.concatenate([series.x for panel in column.panels for series in panel.series])
+    return float(x.min()), float(x.max())
 
 
 def _axis(axis: Axis) -> dict[str, Any]:

@@ -16,6 +16,7 @@ PALETTES = {"light": LIGHT, "dark": DARK}
 PICTURE: dict[Any, Any] = (  # Matplotlib settings for pictures
     LOOK
     | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
+    | {"text.parse_math": False}  # names of models and data sets may contain dollar signs
     | dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), LIGHT["ink"])
     | {"figure.facecolor": LIGHT["paper"], "axes.facecolor": LIGHT["paper"], "grid.color": LIGHT["grid"]}
 )

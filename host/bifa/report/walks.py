@@ -17,7 +17,7 @@ MEASURED, SIMULATED = "measured", "simulated"
 _ROLES = {BASE: "before", COMPLETED: "after"}  # everything else is drawn in ink
 _ROW, _BAR = 1.2, 0.9
 _LINES = ("line", "dashed", "dotted")
-_PATH_STEP_MM = 60.0  # the path's axis ends at a multiple of this
+_MARGIN = 0.05  # share of the path's range that its axis leaves at either end
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,15 @@ class Walk:
 def walks_chart(walks: Sequence[Walk]) -> Chart:
     """Plot all walks over equal times (that of the shortest record) and distances, so that faster ones look faster."""
     horizon_s = min(float(walk.first["time_s"][-1]) for walk in walks)
-    furthest = max(float(_truncate(walk.first, "displacement_head_mm", horizon_s)[1].max()) for walk in walks)
-    reach = (-0.05 * furthest, float(np.ceil(1.02 * furthest / _PATH_STEP_MM) * _PATH_STEP_MM))
+    records = [record for walk in walks for record in walk.records.values()]
+    paths = np.concatenate([[0.0], *(_truncate(r, "displacement_head_mm", horizon_s)[1] for r in records)])
+    margin = _MARGIN * max(float(np.ptp(paths)), 1.0)
+    reach = (float(paths.min()) - margin, float(paths.max()) + margin)
     names = list(dict.fromkeys(name for walk in walks for name in walk.records))
     keys = [Key(chamber, chamber, "area") for chamber in CHAMBERS]
     lines = dict(zip(names, _LINES, strict=False))
     keys += [Key(name, _ROLES.get(name, "ink"), lines[name]) for name in names]
-    pressures = [r[f"pressure_{chamber}_psi"] for walk in walks for r in walk.records.values() for chamber in CHAMBERS]
+    pressures = [r[f"pressure_{chamber}_psi"] for r in records for chamber in CHAMBERS]
     span = (min(float(np.min(p)) for p in pressures) - 1.0, max(float(np.max(p)) for p in pressures) + 1.0)
     return Chart(
         [_column(walk, horizon_s, reach, span, lines) for walk in walks],

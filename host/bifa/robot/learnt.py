@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,13 +36,18 @@ class LearntCurve:
 
     def __post_init__(self) -> None:
         try:
-            values = np.array(self.values, dtype=float)
-            inside = float(self.lower) < float(self.upper)
-        except (TypeError, ValueError):
+            lower, upper, values = float(self.lower), float(self.upper), np.array(self.values, dtype=float)
+        except (TypeError, ValueError, OverflowError):
             raise ModelParameterError("a learnt curve needs numbers lower, upper and rows of equal length") from None
-        if not inside or values.ndim != 2 or values.shape[1] < 2 or not np.all(np.isfinite(values)):
+        if (
+            not 0.0 < upper - lower < math.inf
+            or values.ndim != 2
+            or values.shape[1] < 2
+            or not np.isfinite(values).all()
+        ):
             raise ModelParameterError("a learnt curve needs lower < upper, and rows of at least two finite values")
-        object.__setattr__(self, "values", values)
+        for name, value in (("lower", lower), ("upper", upper), ("values", values)):
+            object.__setattr__(self, name, value)
 
     def at(self, where: ArrayLike, row: int = 0) -> np.ndarray:
         """Value of a row of the curve at `where`, a number or an array."""

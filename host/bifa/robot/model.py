@@ -33,6 +33,8 @@ class Covariance:
             raise ModelParameterError(
                 f"the covariance of {n} parameters must be a symmetric {n} x {n} matrix of numbers"
             )
+        if len(set(self.names)) < n:
+            raise ModelParameterError("the covariance names a parameter twice")
         object.__setattr__(self, "matrix", matrix)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from bifa.errors import BifaError
+from bifa.errors import BifaError, check_range
 from bifa.files import read_text, write_text
 from bifa.robot.learnt import LearntCurve
 from bifa.robot.model import Covariance, Model, Scatter
@@ -22,6 +22,8 @@ from bifa.robot.stiffness import StiffnessCurve
 from bifa.toml import parse_toml
 
 FORMAT = 1
+_FURTHEST_M = 1.0  # of a spring: one in millimetres, which would walk as well, is outside
+_MOST_SCATTER = 1e6
 
 
 class ModelFileError(BifaError):
@@ -149,18 +151,19 @@ def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
 def _read_scatter(entry: dict[str, Any]) -> Scatter:
     _only(entry, "scatter", set(), {field.name for field in fields(Scatter)})
     for name, value in entry.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ModelFileError(f"scatter.{name} must be a number, at least 0")
+        check_range(ModelFileError, f"scatter.{name}", value, 0.0, _MOST_SCATTER)
     return Scatter(**{name: float(value) for name, value in entry.items()})
 
 
 def _read_curve(name: str, entry: dict[str, Any]) -> StiffnessCurve:
     _only(entry, f"stiffness.{name}", {"lower_m", "upper_m", "coefficients"})
+    for end in ("lower_m", "upper_m"):
+        check_range(ModelFileError, f"stiffness.{name}.{end}", entry[end], -_FURTHEST_M, _FURTHEST_M, "m")
     try:
         coefficients = tuple(float(value) for value in entry["coefficients"])
-        curve = StiffnessCurve(coefficients, float(entry["lower_m"]), float(entry["upper_m"]))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ModelFileError(f"stiffness.{name} must hold numbers") from None
+    curve = StiffnessCurve(coefficients, float(entry["lower_m"]), float(entry["upper_m"]))
     curve.equilibria_m  # noqa: B018 - raises if the curve is not bistable
     return curve
 

@@ -62,6 +62,8 @@ def speeds(
     small pieces, since gaits differ in cost. Angles need not be within 0-360.
     """
     gaits = np.ascontiguousarray(gaits, dtype=float).reshape(-1, 6)
+    if not (np.isfinite(gaits).all() and (gaits[:, 0] > 0.0).all()):
+        raise rigs.SimulationError("gaits must be finite numbers, and their periods positive")
     n = gaits.shape[0]
     flats = [plant(model)] * n if isinstance(model, (Model, Plant)) else [plant(one) for one in model]
     count = workers or cores()

@@ -110,6 +110,8 @@ def _call(hook: str, effect: PhysicalEffect, state: str) -> str:
         offered["state"] = f"z{state}"
     given = []
     for argument in inspect.signature(getattr(effects.modules()[effect.name], hook)).parameters:
+        if argument in own and argument in offered:
+            raise EffectError(f"{effect.name}.{hook}: the hook offers {argument!r}, so no parameter can be called that")
         source = own.get(argument) or offered.get(argument)
         if source is None:
             raise EffectError(

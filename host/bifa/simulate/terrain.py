@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifa.errors import check_range
 from bifa.simulate.rigs import SimulationError
 
 PIPE_DIAMETER_M = 0.147
@@ -20,6 +21,7 @@ NARROWEST_M = 0.097
 CONTRACTED_LENGTH_M = 0.186  # 240 mm extended minus the stroke: distance between the two rings of supports
 _SPACING_M = 1e-3
 _MARGIN_M = 0.05
+_MOST_N, _FURTHEST_M = 1000.0, 100.0
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,10 @@ class Supports:
     buckled_m: float = 0.01
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.buckling_N <= 1000.0:
-            raise SimulationError(f"the supports' buckling force {self.buckling_N:g} is outside its range 0 to 1000 N")
+        for what in ("buckling", "friction"):
+            check_range(SimulationError, f"the supports' {what}", getattr(self, f"{what}_N"), 0.0, _MOST_N, "N")
+        for what in ("lip_m", "buckled_m"):
+            check_range(SimulationError, f"the supports' {what}", getattr(self, what), _SPACING_M, 1.0, "m")
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,13 @@ class Obstacle:
     length_m: float
     diameter_m: float
     around: float = 1.0
+
+    def __post_init__(self) -> None:
+        width_mm, widest_mm = 1e3 * self.diameter_m, 1e3 * PIPE_DIAMETER_M
+        check_range(SimulationError, "an obstacle's diameter", width_mm, 1e3 * NARROWEST_M - 1e-6, widest_mm, "mm")
+        check_range(SimulationError, "an obstacle's length", self.length_m, _SPACING_M, _FURTHEST_M, "m")
+        check_range(SimulationError, "an obstacle's start", self.start_m, -CONTRACTED_LENGTH_M, _FURTHEST_M, "m")
+        check_range(SimulationError, "an obstacle's share of the circumference", self.around, 0.0, 1.0)
 
     @property
     def narrowing_m(self) -> float:
@@ -86,15 +97,8 @@ def terrain(obstacles: Sequence[Obstacle], supports: Supports = Supports()) -> n
     """Tabulate obstacles over position, shape (7, n), for `walk(..., terrain=...)`.
 
     Row 0: start, 1 / spacing; rows 1-4: force in N against head forward, head backward, tail forward, tail backward;
-    rows 5, 6: narrowing of the pipe's radius at head and tail, m. Raises SimulationError for an obstacle outside the
-    supported dimensions.
+    rows 5, 6: narrowing of the pipe's radius at head and tail, m.
     """
-    for obstacle in obstacles:
-        if not NARROWEST_M - 1e-9 <= obstacle.diameter_m <= PIPE_DIAMETER_M or obstacle.length_m <= 0.0:
-            raise SimulationError(
-                "an obstacle's diameter must be 97 to 147 mm and its length positive, not "
-                f"{obstacle.diameter_m * 1e3:g} and {obstacle.length_m * 1e3:g} mm"
-            )
     end = max((o.start_m + o.length_m for o in obstacles), default=0.0) + CONTRACTED_LENGTH_M + _MARGIN_M
     x = np.arange(-_MARGIN_M, end, _SPACING_M)
     rows = np.zeros((7, x.size))

@@ -93,6 +93,13 @@ def test_gaits_lists_the_library():
     assert "vertical" not in alone
 
 
+def test_another_robots_gaits_do_not_replace_those_of_the_package(tmp_path):
+    save_model(tmp_path / "model.toml", nominal())
+    result = invoke("gaits", "--make", "--model", tmp_path / "model.toml")
+    assert result.exit_code == 2
+    assert "--model requires --out" in result.output
+
+
 @pytest.mark.parametrize("make", [["--make"], []])
 def test_gaits_refuses_an_unknown_scenario(tmp_path, make):
     result = invoke("gaits", *make, "--only", "moon", "--out", tmp_path)

@@ -11,6 +11,7 @@ from bifa.gait.sensitivity import Front, sensitivity
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import BASELINE, Gait, nominal
 from bifa.simulate import Supports, tunnel
+from bifa.simulate.paper import FAST
 from bifa.simulate.passing import passing
 
 ROBUST = Gait(2.6729, 193.168, 325.634, 0.654, 0.4303, 0.4303)
@@ -59,6 +60,14 @@ def test_sensitivity_scans_every_parameter_around_the_gait(runs, nominal_plant):
     period = scans[0]
     assert period.nominal_mm_s[0] < 2.0  # 15 % faster: the body no longer snaps
     assert period.nominal_mm_s[4] == pytest.approx(22.15 / 1.15, rel=0.05)
+
+
+def test_a_gait_with_which_one_robot_in_ten_stands_has_no_room(runs, nominal_plant):
+    draws = spread_of(nominal()).plants(nominal(), 8, 1)
+    for scan in sensitivity(runs, nominal_plant, draws, FAST, Metric().quicker(), points=5):
+        assert scan.nominal_mm_s[2] > 20.0
+        assert scan.quantile_mm_s[2] < 1.0
+        assert scan.room == (scan.at, scan.at)
 
 
 def test_no_scan_leaves_what_a_gait_may_be(runs, nominal_plant):

@@ -66,5 +66,11 @@
       if (c < 3) found.push(`contrast ${c.toFixed(2)}: ${borderColor} of ${label}`);
     }
   }
+
+  // What stands at one place in the panels of a column has one x.
+  for (const plot of document.querySelectorAll(".plot")) {
+    const spans = new Set(plot.charts.map(({ scales: { x } }) => `${x.min} to ${x.max}`));
+    if (spans.size > 1) found.push(`panels of one column reach from ${[...spans].join(", ")}`);
+  }
   return found;
 }

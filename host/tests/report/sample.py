@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from bifa.campaign.page import campaign_page
+from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
 from bifa.report.evidence import BASE, COMPLETED
+from bifa.report.page import ChartedSection
 from bifa.report.walks import MEASURED, Walk
 from bifa.robot import nominal, save_model
 from bifa.robot.gait import BASELINE, Gait, save_gait
@@ -167,6 +169,18 @@ def traces():
         }
         for n, (label, channel, size) in enumerate(conditions)
     ]
+
+
+def curves():
+    """A static loading at 8.5 psi, measured and modelled: its displacement and its numbers are no round ones."""
+    x = np.concatenate([np.linspace(-0.3, 30.2, 300), np.linspace(30.2, -0.3, 300)])
+    over, measured, base = Axis("displacement, mm"), 8.48 + 0.22 * np.sin(40 * x), np.full(x.size, 8.5)
+    both = [Series(("measured",), x, measured, "measured"), Series((BASE,), x, base, "before", "dashed")]
+    off = [Series((BASE,), np.abs(x), measured - base, "before")]
+    panels = [Panel(both, over, Axis("pressure, psi")), Panel(off, over, Axis("error, psi"), height=0.55)]
+    keys = [Key("measured", "measured"), Key(BASE, "before", "dashed")]
+    chart = Chart([Column(panels, "static loading, small, 8.5 psi, 2 mm/s")] * 3, keys, "measured and modelled")
+    return ChartedSection("Static loading", charts=[chart])
 
 
 def summary(sealed=True):

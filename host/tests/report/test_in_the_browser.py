@@ -29,7 +29,7 @@ def pages(tmp_path_factory):
     for name, page in {
         "campaign": sample.page(),
         "compare": compare_page(runs),
-        "diagnosis": diagnosis_page("the bench", sample.DIAGNOSIS, sample.LABELS),
+        "diagnosis": diagnosis_page("the bench", sample.DIAGNOSIS, sample.LABELS, [sample.curves()]),
     }.items():
         write_page(page, folder / f"{name}.html")
     (folder / "engine.html").write_text(engine_page.render(engines_own()), encoding="utf-8")

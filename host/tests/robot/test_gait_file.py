@@ -3,12 +3,13 @@
 from contextlib import nullcontext
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bifa.ranges import RANGES
-from bifa.robot import BASELINE, GaitError, load_gait, read_gait_file, save_gait
+from bifa.robot import BASELINE, Gait, GaitError, load_gait, nominal, read_gait_file, save_gait
 
 
 def test_round_trip(tmp_path):
@@ -56,6 +57,19 @@ def test_a_bad_gait_file_is_refused_by_file_and_key(tmp_path, old, new, told):
     with pytest.raises(GaitError, match=told) as refused:
         read_gait_file(path)
     assert str(path) in str(refused.value)
+
+
+@pytest.mark.parametrize("number", [np.int64, np.int32, np.float32, np.float64])
+def test_numbers_of_numpy_are_numbers(number):
+    assert Gait(*map(number, [6, 270, 90, 0, 1, 1])).as_dict()["period_s"] == 6.0
+    assert nominal().with_values({"head_mass_kg": number(1)})["head_mass_kg"] == 1.0
+    assert nominal().with_effects({"hysteresis": {"force_N": number(4)}})["hysteresis.force_N"] == 4.0
+
+
+@pytest.mark.parametrize("value", ["5.7", True, np.True_, None, [5.7]])
+def test_what_is_no_number_is_not_said_to_be_out_of_range(value):
+    with pytest.raises(GaitError, match="is not a number"):
+        replace(BASELINE, period_s=value)
 
 
 @given(st.sampled_from(list(BASELINE.as_dict())), st.floats())

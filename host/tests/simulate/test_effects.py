@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -207,6 +208,38 @@ def test_an_effect_that_remembers_without_a_state_is_refused(with_new_effect, ho
 def test_an_effect_without_a_hook_is_refused(with_new_effect):
     with pytest.raises(EffectError, match="swelling does not act"):
         with_new_effect()
+
+
+def test_a_parameter_that_would_hide_what_the_hook_offers_is_refused(with_new_effect, monkeypatch):
+    monkeypatch.setitem(hooks.HOOKS, "reading", (("pressure_psi", "share"), "replace"))
+    with pytest.raises(EffectError, match=r"swelling\.reading: the hook offers 'share'"):
+        with_new_effect(reading=lambda share, pressure_psi: pressure_psi * share)
+
+
+_SIZE = EffectParameter("share", "", 0.0, 1.0, 0.1, "size", size=True)
+
+
+@pytest.mark.parametrize(
+    ("file", "declared", "told"),
+    [
+        ("swelling", None, r"swelling\.py must define EFFECT"),
+        ("swelling", ("leak", _SIZE), r"swelling\.py must define EFFECT = PhysicalEffect\(name='swelling'"),
+        ("swelling-2", ("swelling-2", _SIZE), "a name without hyphens"),
+        (
+            "swelling",
+            ("swelling", replace(_SIZE, size=False)),
+            "swelling does not act: no parameter is marked size=True",
+        ),
+    ],
+)
+def test_a_file_that_is_no_effect_of_its_name_is_refused(file, declared, told, monkeypatch):
+    module = types.ModuleType(file)
+    if declared:
+        name, parameter = declared
+        module.EFFECT = PhysicalEffect(name, "", "F (1 + share)", "a test", "eq. (2)", (), (parameter,))
+    monkeypatch.setattr(effects, "modules", lambda: {file: module})
+    with pytest.raises(EffectError, match=told):
+        effects.library.__wrapped__()
 
 
 PAGE = Path(__file__).parents[3] / "docs" / "adding-an-effect.md"

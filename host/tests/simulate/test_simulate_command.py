@@ -1,14 +1,18 @@
 """`bifa simulate`."""
 
 import csv
+from dataclasses import replace
 from unittest.mock import Mock, call
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from bifa import robot
 from bifa.cli import app
+from bifa.cli.simulate import write_csv
 from bifa.errors import BifaError
+from bifa.robot.learnt import LearntCurve
 from bifa.simulate.paper import FAST, obstacle_rows
 
 
@@ -79,6 +83,20 @@ def test_the_papers_observation_is_in_the_table(monkeypatch):
         obstacle, gait, outcome = row
         assert outcome.through == (gait != "fastest" or obstacle == "arcs"), row
         assert outcome.extension.enough == (gait != "fastest" or obstacle == "arcs"), row
+
+
+def test_a_model_without_a_solution_is_refused_before_anything_is_written(tmp_path):
+    endless = LearntCurve(0.0, 1.0, [[0.0, 1e300]] * 2)
+    robot.save_model(tmp_path / "m.toml", replace(robot.nominal(), learnt={"filling": endless}))
+    result = _run("--model", tmp_path / "m.toml", "--pictures", tmp_path / "p", "--out", tmp_path / "walk.csv")
+    assert isinstance(result.exception, BifaError)
+    assert "nominal cannot be simulated" in str(result.exception)
+    assert [path.name for path in tmp_path.iterdir()] == ["m.toml"]
+
+
+def test_the_times_of_a_long_walk_stay_apart(tmp_path):
+    write_csv(tmp_path / "walk.csv", {"time_s": np.arange(1_019_990, 1_020_001) / 100.0})
+    assert np.diff(np.loadtxt(tmp_path / "walk.csv", skiprows=1)) == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,16 @@ def test_anchor_holds_what_the_paper_says_and_slides_with_less():
         (lambda m: simulate.walk(m, robot.BASELINE, time_s=[1.0, 0.5]), "decrease"),
         (lambda m: simulate.walk(m, robot.BASELINE, inclination_deg=100.0), "-90 to 90"),
         (lambda m: simulate.walk(m, robot.BASELINE, tolerance_m=0.0), "tolerance"),
-        (lambda m: simulate.terrain([simulate.Obstacle(0.1, 0.05, 0.08)]), "97 to 147"),
+        (lambda m: simulate.speeds(m, [[5.7, np.nan, 90.0, 0.5, 0.5, 0.5]]), "finite"),
+        (lambda m: simulate.speeds(m, [[-5.7, 270.0, 90.0, 0.5, 0.5, 0.5]]), "positive"),
+        (lambda m: simulate.Obstacle(0.1, 0.05, 0.08), "97 to 147"),
+        (lambda m: simulate.Obstacle(np.nan, 0.05, 0.1), "start = nan"),
+        (lambda m: simulate.Obstacle(1e7, 0.05, 0.1), "start"),
+        (lambda m: simulate.Obstacle(0.1, np.nan, 0.1), "length = nan"),
+        (lambda m: simulate.Obstacle(0.1, 0.05, 0.1, around=-1.0), "0 to 1"),
+        (lambda m: simulate.Supports(friction_N=np.nan), "friction = nan"),
+        (lambda m: simulate.Supports(buckled_m=0.0), "buckled_m"),
+        (lambda m: simulate.Supports(lip_m=-0.02), "lip_m"),
     ],
 )
 def test_what_cannot_be_simulated_is_refused(call, told):

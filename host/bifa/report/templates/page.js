@@ -22,7 +22,7 @@
     title: { display: Boolean(label), text: label, color: palette.ink },
     min: range ? range[0] : undefined, max: range ? range[1] : undefined,
     grid: { display: !words, color: palette.grid, tickColor: palette.quiet }, border: { color: palette.quiet },
-    ticks: { color: palette.ink, maxTicksLimit: 6, includeBounds: false, maxRotation: 0, autoSkip: !words, callback: ticks.length ? (value) => ticks.find((tick) => tick.value === value)?.label : log ? (value) => (Number.isInteger(Math.log10(value)) ? String(value) : "") : undefined },
+    ticks: { color: palette.ink, maxTicksLimit: 6, includeBounds: false, maxRotation: 0, autoSkip: !words, callback: ticks.length ? (value) => ticks.find((tick) => tick.value === value)?.label : log ? (value) => (Number.isInteger(Math.log10(value)) ? String(value) : "") : (value) => String(Number(value.toPrecision(6))) },
     afterBuildTicks: ticks.length ? (scale) => { scale.ticks = ticks.filter(({ value }) => value >= scale.min && value <= scale.max).map(({ value }) => ({ value })); } : undefined,
     ...options,
   });
