@@ -13,30 +13,37 @@ from bifa.gait.settling import CAMERA_MM, MIN_CYCLES, STANDING_MM_S, settling
 from bifa.gait.uncertainty import Knowledge
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
-from bifa.simulate import gait_rows, speeds
+from bifa.simulate import gait_rows, plant, speeds
 
 DRAWS = 256
 FINE_M = 1e-6  # integration step for gaits near the edge
 CYCLES = 16
 MIN_SPEED_RATIO = 0.8  # of the median of the robots that walk: slower ones do not walk as predicted
-_FASTEST = 0.98  # quantile from which walking robots are identified: at a cliff most robots may fall
+_FASTEST = 0.98  # quantile that counts as the fastest robots: at a cliff most may fall, and a few tell nothing
+_FALLEN = 0.5  # of the fastest robots' speed: a model that is slower has fallen
 
 
 @dataclass(frozen=True)
 class Prediction:
     """Speeds in mm/s of a gait on `DRAWS` robots drawn from what is known, one walk each, failed walks included.
-    `cycles`: after which nearly all have settled; `backward`: speeds are counted backward.
+    `cycles`: after which nearly all have settled; `backward`: speeds are counted backward; `errors_mm_s`: by what each
+    measured speed would differ, which says nothing about whether the robot walks; `own_mm_s`: speed of the model itself.
 
     The speed and its interval refer to the robots that walk, however few; `walks_probability` is how many do."""
 
     speeds_mm_s: np.ndarray
     cycles: int
     backward: bool = False
+    errors_mm_s: np.ndarray | float = 0.0
+    own_mm_s: float = 0.0
 
     @cached_property
     def walks(self) -> np.ndarray:
-        """(n,) which robots walk: those that reach four fifths of the median of all that walk."""
-        walking = self.speeds_mm_s >= MIN_SPEED_RATIO * np.quantile(self.speeds_mm_s, _FASTEST)
+        """(n,) which robots walk: those that reach four fifths of the median of all that walk. These are sought from
+        the model's own speed, or from the fastest robots' if the model itself has fallen."""
+        fastest = float(np.quantile(self.speeds_mm_s, _FASTEST))
+        begun = self.own_mm_s if self.own_mm_s > _FALLEN * fastest else fastest
+        walking = self.speeds_mm_s >= MIN_SPEED_RATIO * begun
         while walking.any():
             least = max(MIN_SPEED_RATIO * float(np.median(self.speeds_mm_s[walking])), STANDING_MM_S)
             before, walking = walking, self.speeds_mm_s >= least
@@ -90,7 +97,7 @@ class Prediction:
         }
 
     def _quantile(self, share: float) -> float:
-        walking = self.speeds_mm_s[self.walks]
+        walking = (self.speeds_mm_s + self.errors_mm_s)[self.walks]
         return float(np.quantile(walking, share)) * (-1.0 if self.backward else 1.0) if walking.size else 0.0
 
 
@@ -99,7 +106,7 @@ class Predictor:
 
     def __init__(self, model: Model, known: Knowledge, *, draws: int = DRAWS, seed: int = 0):
         self._timing, self._noise_share = known.scatter.timing, known.scatter.speed
-        self._robots, self._seed = known.plants(model, draws, seed + 4_000_037), seed
+        self._robots, self._seed = [*known.plants(model, draws, seed + 4_000_037), plant(model)], seed
 
     def of(
         self, gait: Gait, *, cycles: int = CYCLES, clock_rate: float | None = None, workers: int | None = None
@@ -109,21 +116,23 @@ class Predictor:
 
         clock_rate: seconds per second of the Uno, default as known; speeds are on the Uno's clock.
         """
-        draws, rate = len(self._robots), self._timing.clock if clock_rate is None else clock_rate
-        rows = self._with_switch_errors(gait_rows([gait] * draws))
+        draws, rate = len(self._robots) - 1, self._timing.clock if clock_rate is None else clock_rate
+        own = gait_rows([gait])
+        rows = np.vstack([self._with_switch_errors(np.repeat(own, draws, axis=0)), own])
         rows[:, 0] *= rate
         vented_s = rate * self._timing.dead_time_s
         progress = speeds(self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, workers=workers)
         advance_mm = 1e3 * progress.advance_m
         found = [settling(one) for one in advance_mm]
+        settled = _settling_cycles(f.begins for f in found[:draws] if f.is_settled)
         means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
         noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
         camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (MIN_CYCLES * gait.period_s)  # of a speed over `MIN_CYCLES` cycles
-        means = means * (1.0 + self._noise_share * noise[0]) + noise[1] * camera_mm_s
         means = np.nan_to_num(means)
         backward = bool(np.mean(means) < -STANDING_MM_S)
-        along = np.fmax(-means if backward else means, 0.0)
-        return Prediction(along, _settling_cycles(f.begins for f in found if f.is_settled) + MIN_CYCLES, backward)
+        *along, own_mm_s = np.fmax(-means if backward else means, 0.0)
+        errors = np.array(along) * self._noise_share * noise[0] + noise[1] * camera_mm_s
+        return Prediction(np.array(along), settled + MIN_CYCLES, backward, errors, float(own_mm_s))
 
     def _with_switch_errors(self, rows: np.ndarray) -> np.ndarray:
         """The gaits (n, 6) with valves that switch slightly early or late in each walk: at a cliff half a millisecond
