@@ -60,6 +60,7 @@ _KEYS += ("rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]")
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
+_ROW_NUMBER = "[0]"  # in place of a column: the number of the row, from 0
 _THRESHOLD = 2.5  # V, for a strobe of 5 V
 SLOWEST_SYNC_S = 0.002  # the strobe is high for 2.6 ms
 
@@ -162,9 +163,12 @@ def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.nda
     if unit == DATE:
         moments = _moments(sheet, export, source, rows)
         return _seconds(moments, moments)
-    place = sheet.find(source)
-    _refuse_other_unit(sheet, place, name, unit)
-    values = sheet.numbers(place, source, rows)
+    if source == _ROW_NUMBER:
+        values = rows.astype(float)
+    else:
+        place = sheet.find(source)
+        _refuse_other_unit(sheet, place, name, unit)
+        values = sheet.numbers(place, source, rows)
     return values * _scale(export, name) + export.offset.get(name, 0.0)
 
 

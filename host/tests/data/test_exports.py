@@ -279,6 +279,12 @@ def test_a_unit_is_seen_wherever_the_file_gives_it(tmp_path, head, more):
         read(tmp_path, head + "0,1,2\n1,2,3\n", SIMPLE.replace('"F"', f'"{name}"') + more)
 
 
+def test_without_times_rows_are_counted(tmp_path):
+    declaration = SIMPLE.replace('time_s = "t"', 'time_s = "[0]"').replace('time_s = "s"', 'time_s = "frame"')
+    found = read(tmp_path, "t,x,F\n,1,2\n,2,3\n,3,4\n", declaration + "rate_hz = 50\n")
+    np.testing.assert_allclose(found["time_s"], [0.0, 0.02, 0.04])
+
+
 def test_frames_of_another_rate_than_the_presets_are_refused(tmp_path):
     path = written(tmp_path, "vicon", {key: RECORD[key] for key in ("time_s", "displacement_mm")})
     path.write_bytes(path.read_bytes().replace(b"\r\n100\r\n", b"\r\n250\r\n", 1))
