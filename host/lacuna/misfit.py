@@ -36,14 +36,14 @@ def compare_at_misfit(
     each floor that was raised, by (experiment, channel); `found` and an empty dict if no floor had to be raised."""
     was = {key: noise.sd for key, noise in found.search.floor.channels.items()}
     raised: dict[Key, float] = {}
-    left = _residual_rms(found)
+    left = residual_rms(found)
     for _ in range(_ROUNDS):
         level = {key: _FRACTION * rms for key, rms in left.items() if rms > SOFT_LIMIT * was[key]}
         level = {key: sd for key, sd in level.items() if sd > _MIN_RAISE_RATIO * was[key]}
         if not level or found.verdict == "none":
             break
         next_found = again(system.with_floor(level))
-        next_left = _residual_rms(next_found)
+        next_left = residual_rms(next_found)
         if next_found.verdict == "none" or (raised and _mean_log(next_left, left) >= 0.0):
             break
         found, left, raised = next_found, next_left, {key: was[key] for key in level}
@@ -52,7 +52,7 @@ def compare_at_misfit(
     return found, raised
 
 
-def _residual_rms(found: Diagnosis) -> dict[Key, float]:
+def residual_rms(found: Diagnosis) -> dict[Key, float]:
     """RMS residual of the final explanation on its fitted trials, in the channels' units."""
     squares: dict[Key, list[float]] = {}
     residuals = found.final.residuals()

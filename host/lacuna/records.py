@@ -22,6 +22,7 @@ from lacuna.values import plain
 
 TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # per second
 _LABELS = ("name", "experiment", "condition", "order")
+_GIVE_TIMES = "give a column time_s, in seconds (for static data, the row number)"
 _MIN_SAMPLES = 8  # samples in a window or segment
 _MAX_LISTED = 8  # columns listed in a message
 _NUMERIC = b"0123456789+-.eE, \t\r\n"
@@ -49,7 +50,8 @@ class Table:
         for output in outputs:
             if output not in self.columns:
                 raise RecordError(
-                    f"record {self.name} has no column {output}; it has {listed(self.columns, _MAX_LISTED)}."
+                    f"record {self.name} has no column {output}; it has {listed(self.columns, _MAX_LISTED)}. Where an"
+                    " output was not measured, give a lacuna.Record whose `channels` leave it out."
                 )
         return Record(
             name=self.name,
@@ -75,8 +77,9 @@ def read(data: Any) -> list[Record | Table]:
 
     The times are a column, or an index of pandas or xarray, called `time_s`, `time` or `t` (seconds), `time_ms` or
     `time_us`, or dates (in a pandas index under any name). Single values, and the labels `condition` (records with an
-    equal one are repeats), `experiment` and `order` (position in the day), may be columns or entries of `attrs`.
-    Columns are copied; missing or masked samples become NaN, true and false become 1 and 0. Raises RecordError.
+    equal one are repeats), `experiment` and `order` (position in the day), may be columns or entries of `attrs`. An
+    input may have several columns, shape (n, 3). Columns are copied; missing or masked samples become NaN, true and
+    false become 1 and 0. Raises RecordError.
     """
     if isinstance(data, str | Path):
         return _folder(Path(data))
@@ -85,11 +88,8 @@ def read(data: Any) -> list[Record | Table]:
     if _is_table(data):
         return [_table(part, name) for name, part in _parts(data)]
     if isinstance(data, Mapping):
-        if data and all(isinstance(column, np.ndarray) for column in data.values()):
-            raise RecordError(
-                f"a record of {listed(data, _MAX_LISTED)} has no times: give a column time_s, in seconds (for static"
-                " data, the row number)."
-            )
+        if any(isinstance(column, np.ndarray | list | tuple) for column in data.values()):
+            raise RecordError(f"a record of {listed(data, _MAX_LISTED)} has no times: {_GIVE_TIMES}.")
         return [_table(one, str(name)) for name, one in data.items()]
     if isinstance(data, Iterable):
         return [_table(one, f"record {place + 1}") for place, one in enumerate(data)]
@@ -99,8 +99,12 @@ def read(data: Any) -> list[Record | Table]:
 def _is_table(data: Any) -> bool:
     if _is_pandas(data) or _is_xarray(data):
         return True
-    return isinstance(data, Mapping) and any(
-        name in data and not isinstance(data[name], Mapping) and np.ndim(data[name]) == 1 for name in TIMES
+    if not isinstance(data, Mapping):
+        return False
+    return any(
+        np.ndim(data[name]) > 0 and not isinstance(data[name], Mapping) and not _is_pandas(data[name])
+        for name in TIMES
+        if name in data
     )
 
 
@@ -142,8 +146,11 @@ def _of_columns(data: Any, name: str) -> Table:
     if clock:
         time_s = columns.pop(clock)
     if time_s is None:
+        raise RecordError(f"record {name} has no times: {_GIVE_TIMES}. It has {listed(columns, _MAX_LISTED)}.")
+    if np.ndim(time_s) != 1:
         raise RecordError(
-            f"record {name} has no times: give a column time_s, in seconds. It has {listed(columns, _MAX_LISTED)}."
+            f"record {name}: its times have the shape {np.shape(time_s)}: give columns of shape (n,) (with SciPy,"
+            " loadmat(..., squeeze_me=True))."
         )
     name = str(labels.get("name", name))
     singles = {str(n): value for n, value in attrs.items() if isinstance(value, Real | np.bool_ | str)}
@@ -467,7 +474,7 @@ def windows(
         phase = 0.0 if period and period - phase < 0.5 * sample else phase
         name = _part(table, f"window {place + 1}")
         labels = {**table.labels, "condition": f"from {phase:g} s" if period else name, "order": place}
-        columns = {n: c[at] if np.shape(c) == time.shape else c for n, c in table.columns.items()}
+        columns = {n: c[at] if _along(c, table) else c for n, c in table.columns.items()}
         found.append(Table(name, time[at] - time[at][0], columns, labels))
     return found
 
@@ -517,7 +524,7 @@ def attach_run(table: Table, record: Record, outputs: Sequence[str]) -> Record:
 
 
 def _along(column: Any, table: Table) -> bool:
-    return np.shape(column) == table.time_s.shape
+    return np.shape(column)[:1] == table.time_s.shape
 
 
 def _one_long(data: Any) -> Table:

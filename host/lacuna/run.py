@@ -18,14 +18,17 @@ from lacuna.check.numbers import within
 from lacuna.diagnosis import diagnose as engine
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.diagnosis.signature import find_dependences
 from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.estimation.problem import usable_cores, use_threads
 from lacuna.function_system import FunctionSystem
-from lacuna.misfit import compare_at_misfit, residual_correlation_s
+from lacuna.misfit import compare_at_misfit, residual_correlation_s, residual_rms
 from lacuna.progress import Progress
 from lacuna.records import Table, attach_run, read
 from lacuna.system import Record, System, several
 from lacuna.verdict import Verdict
+
+_MOST = 0.5  # of the residual variance: a dependence that a verdict `none` does not hide
 
 _log = logging.getLogger("lacuna")
 
@@ -178,12 +181,15 @@ def _with_residual_warnings(
     """Add warnings about the residual: if it is far above the floor, and if only a repeat or the user can tell whether
     it is noise. The advice is tried first, and withheld if following it would remove a named effect."""
     levels = found.search.floor.channels
-    doubted = [
-        f"No explanation comes near the floor of {channel}{within(experiment, (e for e, _ in levels))} ({floor:.3g}),"
-        f" so doubt the floor before the model; a repeat would tell. They were compared at a floor of"
-        f" {levels[experiment, channel].sd:.3g}, a fraction of the best one's residual."
-        for (experiment, channel), floor in raised.items()
-    ]
+    doubted = []
+    for (experiment, channel), floor in raised.items():
+        noise = levels[experiment, channel]
+        doubt = "" if noise.repeats else ", so doubt the floor before the model; a repeat would tell"
+        doubted.append(
+            f"No explanation comes near the floor of {channel}{within(experiment, (e for e, _ in levels))}"
+            f" ({floor:.3g}){doubt}. They were compared at a floor of {noise.sd:.3g}, a fraction of the best one's"
+            " residual."
+        )
     left_s = residual_correlation_s(found) if found.left.matters and not raised else {}
     advised = {
         channel: float(f"{seconds:.2g}")
@@ -198,7 +204,38 @@ def _with_residual_warnings(
         f' noise_time_s={{"{channel}": {seconds:g}}}, or "estimated".'
         for channel, seconds in advised.items()
     ]
-    return replace(found, warnings=(*doubted, *found.warnings, *said)) if said or doubted else found
+    if not isinstance(system, FunctionSystem):
+        return replace(found, warnings=(*doubted, *found.warnings, *said))
+    if not found.effects:
+        said += [
+            f"The residual of {channel} changes from sample to sample, as noise does that has outliers or grows with"
+            f' the signal. If it is noise, declare its RMS: sensor_noise={{"{channel}": {rms:.3g}}}; if it grows with'
+            " the signal, predict the logarithm (of counts, the square root)."
+            for channel, rms in _white(found, left_s).items()
+        ]
+    if found.verdict == "none":
+        hidden = [
+            key
+            for key, noise in levels.items()
+            if not (noise.repeats or system.noise_time_s(*key) or key in found.left.remainder.found)
+        ]
+        said += [
+            f"{100 * d.share:.0f} % of the residual variance of {d.channel} follows {' and '.join(d.quantities)},"
+            " though it changes from sample to sample as noise does: if the samples are in no order, sort them by"
+            " that, or repeat some of them."
+            for d in find_dependences(found.base, hidden)
+            if d.share > _MOST
+        ]
+    return replace(found, warnings=(*doubted, *found.warnings, *said))
+
+
+def _white(found: Diagnosis, left_s: Mapping[str, float]) -> dict[str, float]:
+    """RMS residual of the channels in which something is left that neither has a correlation time nor depends on
+    anything."""
+    dependent = {d.channel for d in found.left.signature.dependences}
+    left = residual_rms(found)
+    keys = [key for key in found.left.remainder.found if left_s.get(key[1]) == 0.0 and key[1] not in dependent]
+    return {channel: max(left[key] for key in keys if key[1] == channel) for _, channel in keys}
 
 
 def with_records(system: System, records: Any) -> FunctionSystem:

@@ -27,7 +27,7 @@ _FALLEN = 0.5  # of the fastest robots' speed: a model that is slower has fallen
 class Prediction:
     """Speeds in mm/s of a gait on `DRAWS` robots drawn from what is known, one walk each, failed walks included.
     `cycles`: after which nearly all have settled; `backward`: speeds are counted backward; `errors_mm_s`: by what each
-    measured speed would differ, which says nothing about whether the robot walks; `own_mm_s`: speed of the model itself.
+    measured speed would differ, which says nothing about whether the robot walks; `own_mm_s`: the model's own speed.
 
     The speed and its interval refer to the robots that walk, however few; `walks_probability` is how many do."""
 

@@ -16,8 +16,13 @@ _FEWEST_SAMPLES = 8
 
 def check_record(trial: Record) -> None:
     time = np.asarray(trial.time_s)
-    if time.ndim != 1 or time.dtype.kind not in "fiu" or len(time) < _FEWEST_SAMPLES:
-        raise MisuseError(f"trial {trial.name}: its times are not a sequence of at least {_FEWEST_SAMPLES} numbers.")
+    if time.ndim != 1 or time.dtype.kind not in "fiu":
+        raise MisuseError(f"trial {trial.name}: its times are not a sequence of numbers.")
+    if len(time) < _FEWEST_SAMPLES:
+        raise MisuseError(
+            f"trial {trial.name} has {len(time)} samples: a record needs at least {_FEWEST_SAMPLES}. Rows of a static"
+            " table belong together in one record."
+        )
     if not np.isfinite(time).all():
         raise MisuseError(f"trial {trial.name}: time at sample {first(~np.isfinite(time))} is not a number.")
     if said := describe_reversal(time):
@@ -34,15 +39,18 @@ def check_record(trial: Record) -> None:
         if np.isinf(column).any():
             raise MisuseError(f"{where}: infinite at sample {first(np.isinf(column))}; mark missing samples as NaN.")
         if np.isfinite(column).sum() < _FEWEST_SAMPLES:
-            raise MisuseError(f"{where}: fewer than {_FEWEST_SAMPLES} valid samples.")
+            raise MisuseError(
+                f"{where}: fewer than {_FEWEST_SAMPLES} valid samples. Give the record as a lacuna.Record whose"
+                " `channels` leave it out."
+            )
 
 
 def check_columns(trials: Sequence[Record]) -> None:
     """Raise MisuseError if an input that is sampled like the times in one trial has another length in some trial."""
-    sampled = {n for t in trials for n, column in t.inputs.items() if np.shape(column) == t.time_s.shape}
+    sampled = {n for t in trials for n, column in t.inputs.items() if np.shape(column)[:1] == t.time_s.shape}
     for trial in trials:
         for name, column in trial.inputs.items():
-            if name in sampled and np.ndim(column) == 1 and len(column) != len(trial.time_s):
+            if name in sampled and np.ndim(column) and len(column) != len(trial.time_s):
                 raise MisuseError(
                     f"trial {trial.name}, input {name}: {len(column)} values, but there are {len(trial.time_s)} times."
                 )

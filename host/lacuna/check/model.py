@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from lacuna.check.measured import gaps_in_inputs
 from lacuna.check.numbers import SAME, changed, differ, spread
 from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.records import Stretch
@@ -29,9 +30,10 @@ def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Cha
     predictions = {t.name: predicted(system, start, (), t) for t in trials}
     failed = [t.name for t in trials if _failing(t, predictions[t.name]) is not None]
     if len(failed) == len(trials):
+        why = next(iter(gaps_in_inputs(trials)), "Choose values that can be simulated.")
         raise MisuseError(
             f"trial {failed[0]}, channel {_failing(trials[0], predictions[failed[0]])}: the prediction is NaN, as in"
-            " every trial, with the parameters at their initial values. Choose values that can be simulated."
+            f" every trial, with the parameters at their initial values. {why}"
         )
     good = [t for t in trials if t.name not in failed]
     _check_deterministic(system, start, good[0], predictions)

@@ -15,7 +15,7 @@ def check_names(system: System, trials: Sequence[Record]) -> None:
     if len(trials) < _FEWEST_TRIALS:
         raise TooLittleDataError(
             f"{len(trials)} trial{'' if len(trials) == 1 else 's'} given: a diagnosis needs at least {_FEWEST_TRIALS},"
-            " two for fitting and one for selection. One long record can be cut into windows."
+            " two for fitting and one for selection. One long record can be cut up: lacuna.windows, lacuna.segments."
         )
     for name in _repeated(t.name for t in trials):
         raise MisuseError(f"trial {name}: more than one trial has this name; names must be unique.")

@@ -112,7 +112,7 @@ def not_declared(trials: Sequence[Record]) -> Iterator[str]:
         return
     for first, other in combinations(trials, 2):
         alike = np.array_equal(first.time_s, other.time_s)  # stretches of one run are not
-        driven = any(np.shape(column) == first.time_s.shape for column in first.inputs.values())
+        driven = any(np.shape(column)[:1] == first.time_s.shape for column in first.inputs.values())
         if alike and driven and first.experiment == other.experiment and _same_columns(first.inputs, other.inputs):
             yield (
                 f"Trials {first.name} and {other.name} have the same inputs, but no repeats are declared. If they are"
@@ -177,24 +177,35 @@ def _number_changed(one: object, other: object) -> bool:
     return all(n.ndim == 0 and n.dtype.kind in "fiu" for n in numbers) and bool(numbers[0] != numbers[1])
 
 
-def _column_changed(first: Record, other: Record, name: str, spread_of_all: float) -> bool:
-    if spread_of_all == 0.0 or not (_is_sampled(first, name) and _is_sampled(other, name)):
+def _column_changed(first: Record, other: Record, name: str, spread_of_all: np.ndarray) -> bool:
+    if not (_is_sampled(first, name) and _is_sampled(other, name)) or _width(first, name) != _width(other, name):
         return False
     apart = np.asarray(first.inputs[name]) - _at_times_of(first, other, name)
-    return bool(np.sqrt(np.nanmean(apart**2)) > _MAX_INPUT_DIFFERENCE * spread_of_all)
+    return bool((np.sqrt(np.nanmean(apart**2, axis=0)) > _MAX_INPUT_DIFFERENCE * spread_of_all).any())
 
 
 def _at_times_of(first: Record, other: Record, name: str) -> np.ndarray:
-    return np.interp(first.time_s - first.time_s[0], other.time_s - other.time_s[0], other.inputs[name])
+    """The other's samples of an input at the times of the first; the first's own after the other's end."""
+    at, there = first.time_s - first.time_s[0], other.time_s - other.time_s[0]
+    found = np.apply_along_axis(lambda column: np.interp(at, there, column), 0, np.asarray(other.inputs[name]))
+    after = at > there[-1]
+    found[after] = np.asarray(first.inputs[name])[after]
+    return found
 
 
-def _input_spread(trials: Sequence[Record], name: str) -> float:
-    """Spread of an input over all trials, since a measured input may be pure noise in one of them."""
-    columns = [np.asarray(t.inputs[name]) for t in trials if _is_sampled(t, name)]
-    return spread(np.concatenate(columns)) if columns else 0.0
+def _input_spread(trials: Sequence[Record], name: str) -> np.ndarray:
+    """Spread of an input over all trials, since a measured input may be pure noise in one of them; of each of its
+    columns if it has several."""
+    having = [t for t in trials if _is_sampled(t, name)]
+    columns = [np.asarray(t.inputs[name], float) for t in having if _width(t, name) == _width(having[0], name)]
+    return np.nanstd(np.concatenate(columns), axis=0) if columns else np.zeros(())
+
+
+def _width(trial: Record, name: str) -> tuple[int, ...]:
+    return np.shape(trial.inputs[name])[1:]
 
 
 def _is_sampled(trial: Record, name: str) -> bool:
-    """Whether the input of this name is numeric with one value for each of the trial's times."""
+    """Whether the input of this name is numeric with one value, or one row of values, for each of the trial's times."""
     column = np.asarray(trial.inputs.get(name))
-    return column.shape == trial.time_s.shape and column.dtype.kind in "fiu"
+    return column.shape[:1] == trial.time_s.shape and column.dtype.kind in "fiu"

@@ -15,8 +15,8 @@ from lacuna.diagnosis.residual_error import (
     at_full_size,
     by_trial,
     excess_over,
+    level_of,
     repeat_differences,
-    rms,
     share_of_gap,
     with_residuals,
 )
@@ -253,8 +253,7 @@ class Case:
             base, candidate = self.cross_validated[base], self.cross_validated[candidate]
         scaled = by_trial([candidate.fitted, candidate.checked])
         pairs = repeat_differences(self.split.fit, self.split.judging, scaled)[1]
-        floor = rms(pairs) if pairs else 1.0
-        return share_of_gap(base.checked_error[1], candidate.checked_error[1], floor)
+        return share_of_gap(base.checked_error[1], candidate.checked_error[1], level_of(pairs))
 
     def _tested(self, *fits: Fit) -> Remainder:
         trials, scaled = zip(*with_residuals(fits), strict=True)

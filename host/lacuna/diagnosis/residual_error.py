@@ -58,7 +58,13 @@ def floor_of(fitted: Fit, split: Split) -> Floor:
     fit_pairs = repeat_differences(known, (), scaled)[0]
     held_out_pairs = repeat_differences(others, split.final, scaled)[1]
     condition_pairs = repeat_differences(split.unseen, split.conditions, scaled)[1]
-    return Floor(*(rms(pairs) if pairs else 1.0 for pairs in (fit_pairs, held_out_pairs, condition_pairs)))
+    return Floor(*map(level_of, (fit_pairs, held_out_pairs, condition_pairs)))
+
+
+def level_of(pairs: Iterable[Channels]) -> float:
+    """RMS of the differences between repeats; 1 if no two repeats have a sample in common."""
+    level = rms(pairs)
+    return level if np.isfinite(level) else 1.0
 
 
 def share_of_gap(before: float, after: float, floor: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,13 +51,18 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *,
         key=lambda key: (-remainder.shared[key], key),
     )
     experiments = tuple(dict.fromkeys(experiment for experiment, _ in places))
-    data = _gather(fitted)
-    dependences = [d for key in places[:4] if (d := _dependence(key, data[key])) is not None]
+    dependences = find_dependences(fitted, places[:4])
     depends_on = list(dict.fromkeys(q for d in dependences for q in d.quantities))[:_MOST_NAMED]
     if drifts:
         depends_on.append("order of the session")
     text = _sentence(places, remainder, dependences, drifts, unshared, fitted)
     return Signature(experiments, tuple(depends_on), tuple(dependences), text)
+
+
+def find_dependences(fitted: Fit, keys: Iterable[tuple[str, str]]) -> list[Dependence]:
+    """What the residual of `fitted` in each of these (experiment, channel) pairs depends on, where it does."""
+    data = _gather(fitted)
+    return [d for key in keys if key in data and (d := _dependence(key, data[key])) is not None]
 
 
 _Rows = list[tuple[np.ndarray, Mapping[str, np.ndarray]]]

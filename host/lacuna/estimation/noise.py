@@ -175,6 +175,8 @@ def _of_correlated(
         kept = np.exp(-period / correlated_s)
         changes.append((samples[lag:] - samples[:-lag]) / np.sqrt(2.0 * (1.0 - kept**lag)))
         pieces.append((1.0 + kept) / (1.0 - kept))
+    if not np.isfinite(np.concatenate(changes)).any():  # samples are further apart than that: their noise is white
+        return _of_fast_noise(members, channel, sensor, basis)
     sd = float(1.4826 * np.nanmedian(np.abs(np.concatenate(changes))))
     return ChannelNoise(max(sd, sensor, _min_sd(members, channel)), 0.0, float(np.median(pieces)), 0)
 
@@ -199,7 +201,8 @@ def _moves(trial: Record, channel: str) -> np.ndarray:
     window_s = max(1, round(_WINDOW_S / period)) * period
     smooth = _smooth(samples)
     later, sooner = (np.interp(time_s + way * window_s, time_s, smooth) for way in (1, -1))
-    return np.abs(later - sooner) > _MOVING_SIGMAS * max(fast_noise(time_s, samples), 1e-12)
+    least = 1e-12 * float(np.nanstd(samples))
+    return np.abs(later - sooner) > _MOVING_SIGMAS * max(fast_noise(time_s, samples), least)
 
 
 def _jitter(

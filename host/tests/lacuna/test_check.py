@@ -421,6 +421,16 @@ def test_warns_of_a_parameter_that_changes_nothing():
     assert said_of(heater.records(2), idle) == ("unused does not affect any prediction.",)
 
 
+def test_a_gap_in_an_input_of_every_record_is_the_reason_why_nothing_is_predicted():
+    given = heater.records(2)
+    for one in given.values():
+        one["power_W"][0] = np.nan
+    with pytest.raises(
+        MisuseError, match=r"the prediction is NaN.* Trial steps_4W_1, input power_W: no number at sample 0"
+    ):
+        said_of(given)
+
+
 def test_warns_of_an_input_with_a_gap():
     given = heater.records(2)
     for one in given.values():

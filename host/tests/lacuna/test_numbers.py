@@ -55,6 +55,17 @@ def test_a_rounded_record_written_with_few_decimals_has_the_same_floor(step, dec
         assert floor_of(rounded, predicted=True) == pytest.approx(step / np.sqrt(12.0), rel=0.1)
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-14, 1e14])
+def test_the_jitter_of_events_does_not_depend_on_the_unit_of_an_output(unit):
+    draw, times = np.random.default_rng(3), np.arange(0.0, 30.0, 0.05)
+    late = 0.3 * draw.standard_normal(6)
+    peaks = [np.exp(-((times - 15.0 - by) ** 2)) + 1e-3 * draw.standard_normal(len(times)) for by in late]
+    given = [{"time_s": times, "y": unit * y, "condition": "all"} for y in peaks]
+    noise = estimate_noise(system(), with_records(system(), given).trials).channels["run", "y"]
+    assert noise.jitter_s == pytest.approx(np.std(late, ddof=1), rel=0.05)
+    assert noise.sd / unit < 5e-3
+
+
 def test_a_record_that_was_not_rounded_has_no_rounding():
     draw = np.random.default_rng(0)
     decimals = np.round(np.sin(np.linspace(0, 9, 400)) + 1e-2 * draw.standard_normal(400), 3)

@@ -198,3 +198,72 @@ def test_a_record_that_is_itself_fast_does_not_pass_for_noise(cubic, verdict):
     assert "Repeats share" not in str(found)
     if verdict == "identified":
         assert found.effects[0].parameters["gain"] == pytest.approx(cubic, rel=0.02)
+
+
+HEAVY = "declare its RMS: sensor_noise={"
+
+
+@pytest.mark.parametrize("kind", ["outliers", "proportional"])
+def test_fast_noise_that_is_not_even_may_be_declared(kind):
+    """The floor is the typical distance of neighbours, which noise with outliers exceeds in RMS."""
+    draw, u = np.random.default_rng(2), 5.0 + 4.0 * np.sin(np.linspace(0.0, 40.0, 1600))
+    shape = draw.standard_t(3, len(u)) if kind == "outliers" else 0.02 * u**2 * draw.standard_normal(len(u))
+    records = lacuna.segments({"time_s": np.arange(len(u)) * 0.1, "u": u, "y": 2.0 * u + shape}, 8)
+
+    def found(**told):
+        cubic = Effect("cubic", Parameter("gain", "", 0.01, -1.0, 1.0))
+        gain = Parameter("gain", "", 1.5, 0.0, 5.0)
+        model = lacuna.System(
+            lambda record, theta: theta.gain * record["u"] + theta.cubic.gain * record["u"] ** 3,
+            gain,
+            cubic,
+            outputs="y",
+            **told,
+        )
+        return lacuna.diagnose(model, records, progress=False)
+
+    first = found()
+    assert first.verdict == "unexplained"
+    (said,) = [w for w in first.warnings if HEAVY in w]
+    told = float(said.split('"y": ')[1].split("}")[0])
+    assert found(sensor_noise={"y": told}).verdict == "none"
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.2])
+def test_a_table_in_no_order_does_not_hide_what_its_residual_follows(bend):
+    draw = np.random.default_rng(4)
+    x = draw.uniform(0.0, 5.0, 200)
+    table = {"x": x, "y": 2.0 * x + bend * x**2 + 0.02 * draw.standard_normal(200)}
+    square = Effect("square", Parameter("by", "", 0.1, -3.0, 3.0))
+    gain = Parameter("gain", "", 1.5, -5.0, 5.0)
+    model = lacuna.System(
+        lambda record, theta: theta.gain * record["x"] + theta.square.by * record["x"] ** 2, gain, square, outputs="y"
+    )
+
+    def found(order):
+        rows = {"time_s": np.arange(200), **{name: column[order] for name, column in table.items()}}
+        return lacuna.diagnose(model, lacuna.segments(rows), progress=False)
+
+    shuffled, ordered = found(np.arange(200)), found(np.argsort(x))
+    said = [warning for warning in shuffled.warnings if "sort them by that" in warning]
+    assert (shuffled.verdict, len(said)) == ("none", 1 if bend else 0)
+    assert ordered.verdict == ("identified" if bend else "none")
+
+
+@pytest.mark.parametrize("noise_time_s", [10.0, "estimated"])
+def test_an_output_that_is_sampled_more_seldom_than_its_noise_changes_has_a_floor(noise_time_s):
+    """A correlation time that is declared for all outputs; of one of them, every sixtieth sample is known."""
+    one = record(4, slow_K=0.3)
+    draw = np.random.default_rng(5)
+    one["wall_K"] = np.full(len(one["time_s"]), np.nan)
+    one["wall_K"][::60] = 0.5 * heater.measured(one["power_W"], 3)[::60] + 0.1 * draw.standard_normal(67)
+
+    def simulate(record, theta):
+        found = heater.simulate(record, theta)["temperature_K"]
+        return {"temperature_K": found, "wall_K": 0.5 * found}
+
+    system = lacuna.System(simulate, heater.PARAMETERS, heater.EFFECTS, noise_time_s=noise_time_s)
+    found = lacuna.diagnose(system, lacuna.segments(one, 5), progress=False)
+    assert found.verdict == "none"
+    assert "could not predict" not in str(found)
+    assert 0.05 < found.diagnosis.search.floor.channels["run", "wall_K"].sd < 0.15

@@ -129,7 +129,22 @@ def test_parts_of_several_runs_go_together_by_the_runs_names():
     assert len({part.labels["condition"] for part in cut}) == 2, "the same phase of a cycle, in whichever run"
 
 
+@pytest.mark.parametrize(
+    ("cut", "samples"), [(lambda one: windows(one, 10.0), 10), (lambda one: segments(one, 10), 10)]
+)
+def test_every_column_of_an_input_is_cut(cut, samples):
+    parts = cut({"time_s": np.arange(100.0), "y": np.arange(100.0), "wind": np.arange(300.0).reshape(100, 3)})
+    assert [part.columns["wind"].shape for part in parts] == [(samples, 3)] * 10
+    assert parts[3].columns["wind"][0].tolist() == [90.0, 91.0, 92.0]
+
+
 REFUSED_ARRAYS = {
+    "a record of x, y has no times: .*for static data, the row number": {"x": [1.0, 2.0], "y": [1.0, 2.0]},
+    r"times have the shape \(9, 1\).*squeeze_me": {
+        "__header__": b"",
+        "time_s": np.zeros((9, 1)),
+        "y": np.zeros((9, 1)),
+    },
     "a record of y, u has no times: give a column time_s": {"y": np.zeros(9), "u": np.zeros(9)},
     r"sample 0: column force has .*1,000\.5.*not a number": {"time_s": [0.0, 1.0], "force": ["1,000.5", "2"]},
     "sample 1: column note .*windy.*leave the column out": {"time_s": [0.0, 1.0], "note": ["", "windy"]},

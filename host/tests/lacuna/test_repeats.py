@@ -120,3 +120,42 @@ def test_runs_that_differ_by_more_than_the_noise_do_not_hide_what_is_missing(spr
         assert found.diagnosis.search.floor.channels["run", "y"].sd == pytest.approx(0.05, rel=0.1)
         assert {name for own in found.nuisances.values() for name in own} == {"offset"}
         assert np.std([own["offset"] for own in found.nuisances.values()]) > 0.5 * spread
+
+
+@pytest.mark.parametrize("samples", [200, 90])
+def test_a_repeat_that_ended_sooner_is_a_repeat(samples):
+    records = heater.records(2)
+    for record in list(records.values())[1::2]:
+        record.update({name: record[name][:samples] for name in ("time_s", "power_W", "temperature_K")})
+    assert not said_of(records)
+
+
+def test_an_input_of_several_columns_is_compared_between_repeats():
+    def simulate(record, theta):
+        return heater.bare({"power_W": record["heaters_W"].sum(axis=1)}, theta)
+
+    records = heater.records(2)
+    for record in records.values():
+        record["heaters_W"] = np.stack([record.pop("power_W"), np.zeros(len(heater.TIME_S))], axis=1)
+    assert not said_of(records, heater.modelled(simulate))
+    records["steps_4W_2"]["heaters_W"][:, 1] = 2.0
+    with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are declared as repeats.*heaters_W differs"):
+        said_of(records, heater.modelled(simulate))
+
+
+@pytest.mark.parametrize("missing", [slice(0, None, 2), slice(0, 120)])
+def test_repeats_without_a_sample_in_common_still_show_what_is_missing(missing):
+    """One repeat lacks the samples that the other has, so that their differences give no floor."""
+    records = heater.records(2, sensor_lag__lag_s=3.0)
+    for place, record in enumerate(records.values()):
+        lacking = np.zeros(len(heater.TIME_S), bool)
+        lacking[missing] = True
+        record["temperature_K"][lacking == bool(place % 2)] = np.nan
+    found = lacuna.diagnose(heater.system(), records, progress=False)
+    assert [effect.name for effect in found.effects] == ["sensor_lag"]
+
+
+def test_a_floor_from_repeats_is_not_doubted_for_want_of_repeats():
+    found = lacuna.diagnose(heater.modelled(heater.bare), heater.records(2, offset__power_W=3.0), progress=False)
+    (said,) = [warning for warning in found.warnings if "No explanation comes near" in warning]
+    assert "a repeat would tell" not in said
