@@ -50,7 +50,7 @@ def console(port: Annotated[str | None, PORT] = None) -> None:
             typer.echo("the Uno confirms that all valves are off")
 
 
-def _lines(uno: "Uno") -> Iterator[str]:
+def piped_lines(uno: "Uno") -> Iterator[str]:
     """Yield the pipe's lines, and keep the link to the Uno alive while the pipe is silent."""
     import queue
     import threading
@@ -75,7 +75,7 @@ def _pipe(uno: "Uno", rig: "Rig") -> bool:
 
     good = True
     uno.session.lines.clear()  # drop the greeting: a pipe's reader expects only answers
-    for line in _lines(uno):
+    for line in piped_lines(uno):
         lines = type_line(uno, line, rig.clock)
         typer.echo("\n".join(lines))
         good = good and lines[-1].startswith("ok")
