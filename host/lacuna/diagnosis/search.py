@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -102,7 +102,9 @@ def search(
         promises = _larger(case, tried, ranked, workers) if size < LARGEST_SET else []
         if not promises:
             break
-        keep_best(tried, raced(ranked[0], promises))
+        found = raced(ranked[0], promises)
+        keep_best(tried, found)
+        keep_best(tried, better_subsets(case, tried, found))
     return Search(tried[frozenset()], floor, tuple(tried.values()), scores.screened(), tuple(freed))
 
 
@@ -122,6 +124,20 @@ def keep_best(tried: dict[frozenset[str], Candidate], found: Iterable[Candidate]
     for one in found:
         same = frozenset(one.effects)
         tried[same] = min(tried.get(same, one), one, key=lambda c: c.cost)
+
+
+def better_subsets(
+    case: Case, tried: dict[frozenset[str], Candidate], found: Sequence[Candidate]
+) -> Iterator[Candidate]:
+    """Sets in which an effect has vanished, refitted without it, if they cost less than the smaller set that was tried:
+    with more effects its fit found a better optimum."""
+    library = case.system.effects
+    for one in found:
+        theta = one.fitted.theta
+        kept = [e for e in one.effects if any(theta[name] != library[e].absent for name in library[e].size_names)]
+        same = tried.get(frozenset(kept))
+        if len(kept) < len(one.effects) and (same is None or same.cost - one.cost > _MIN_GAIN):
+            yield refitted_without(one, kept, case.split)
 
 
 def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate]:

@@ -9,7 +9,7 @@ from lacuna.diagnosis import race as race_module
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.race import refit_multi_start
 from lacuna.diagnosis.score import remaining_after, score
-from lacuna.diagnosis.search import escape_local_optimum, search, with_derivatives
+from lacuna.diagnosis.search import better_subsets, escape_local_optimum, search, with_derivatives
 from lacuna.estimation.fit import Fit, fit, reweigh
 from lacuna.estimation.structure import Structure
 
@@ -80,6 +80,23 @@ def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case
     assert escape_local_optimum(astray, [delayed], case.split).cost < right.cost + 1.0
     assert escape_local_optimum(astray, [], case.split) is None
     assert escape_local_optimum(right, [delayed], case.split) is None
+
+
+def test_a_set_in_a_wrong_minimum_is_led_out_by_a_larger_one_in_which_an_effect_has_vanished():
+    """A Stribeck friction fitted alone had ended elsewhere than beside a drag of 0 N/m, so that neither was named."""
+    case = case_of(hide({"delay.delay_s": 0.03}, seed=33))
+    floor = case.fit_base(1).problem.floor
+    alone, both = (
+        fit(Structure(case.system, effects), case.split.fit, floor) for effects in (("delay",), ("delay", "coulomb"))
+    )
+    right, vanished = case.judge(alone), case.judge(moved(both, **{"coulomb.force_N": 0.0}))
+    astray = case.judge(moved(alone, mass_kg=alone.theta["mass_kg"] + 0.03))
+    assert astray.cost > vanished.cost + 10.0
+    (found,) = better_subsets(case, {frozenset(astray.effects): astray}, [vanished])
+    assert found.effects == ("delay",)
+    assert found.cost < right.cost + 1.0
+    assert not list(better_subsets(case, {frozenset(right.effects): right}, [vanished]))
+    assert not list(better_subsets(case, {frozenset(astray.effects): astray}, [case.judge(both)])), "it is there"
 
 
 @pytest.mark.slow

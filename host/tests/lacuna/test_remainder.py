@@ -9,7 +9,7 @@ from toy import slow
 
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.remainder import Remainder, find_remainder
-from lacuna.estimation.noise import ChannelNoise, NoiseFloor
+from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
 from lacuna.system import Record, System
 
 TIME_S = np.arange(1000) * 0.01
@@ -104,6 +104,18 @@ def test_noise_alone_is_seldom_structure_where_some_conditions_have_repeats():
         for k in range(40)
     )
     assert found <= 2, "binomial, 40 draws at 0.01: three or more happen once in 130"
+
+
+def test_noise_alone_is_seldom_structure_where_nothing_has_repeats():
+    """The floor is then the fast noise of the same few samples, hardly better known than what is compared with it."""
+    system, found = OneChannel(0.0), 0
+    for seed in range(200):
+        z = noise(8, seed, samples=20)
+        trials = [Record(f"{k}", KEY[0], f"{k}", TIME_S[:20], {KEY[1]: row}) for k, row in enumerate(z)]
+        floor = estimate_noise(system, trials)
+        scaled = [{KEY[1]: row / floor.channels[KEY].sd} for row in z]
+        found += find_remainder(system, trials, scaled, floor, policy=POLICY).matters
+    assert found <= 4, "13 in 100 mattered while the floor counted as known"
 
 
 def test_repeats_without_noise_do_not_hide_structure():
