@@ -130,9 +130,10 @@ class Predictor:
         camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (MIN_CYCLES * gait.period_s)  # of a speed over `MIN_CYCLES` cycles
         means = np.nan_to_num(means)
         backward = bool(np.mean(means) < -STANDING_MM_S)
-        *along, own_mm_s = np.fmax(-means if backward else means, 0.0)
-        errors = np.array(along) * self._noise_share * noise[0] + noise[1] * camera_mm_s
-        return Prediction(np.array(along), settled + MIN_CYCLES, backward, errors, float(own_mm_s))
+        along = np.fmax(-means if backward else means, 0.0)
+        drawn, own_mm_s = along[:draws], float(along[draws])
+        errors = drawn * self._noise_share * noise[0] + noise[1] * camera_mm_s
+        return Prediction(drawn, settled + MIN_CYCLES, backward, errors, own_mm_s)
 
     def _with_switch_errors(self, rows: np.ndarray) -> np.ndarray:
         """The gaits (n, 6) with valves that switch slightly early or late in each walk: at a cliff half a millisecond

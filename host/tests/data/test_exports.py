@@ -285,24 +285,29 @@ def test_without_times_rows_are_counted(tmp_path):
     np.testing.assert_allclose(found["time_s"], [0.0, 0.02, 0.04])
 
 
-def test_frames_of_another_rate_than_the_presets_are_refused(tmp_path):
-    path = written(tmp_path, "vicon", {key: RECORD[key] for key in ("time_s", "displacement_mm")})
-    path.write_bytes(path.read_bytes().replace(b"\r\n100\r\n", b"\r\n250\r\n", 1))
-    with pytest.raises(DatasetError, match="lacks the column 100 / Frame; it has 250 / Frame"):
-        read_export(path, by_preset("vicon", "camera"), ("time_s", "displacement_mm"))
-    other = by_preset("vicon", "camera", 'rate_hz = 250\ncolumns = { time_s = "250 / Frame" }\n')
-    found, _, _ = read_export(path, other, ("time_s", "displacement_mm"))
-    np.testing.assert_allclose(found["time_s"], 0.4 * TIME_S, atol=1e-6)
-
-
-def test_an_export_whose_preamble_tells_of_another_unit_is_refused(tmp_path):
-    path = written(tmp_path, "motive", {key: RECORD[key] for key in ("time_s", "displacement_mm")})
-    path.write_bytes(path.read_bytes().replace(b"Units,Meters", b"Units,Millimeters", 1))
-    with pytest.raises(DatasetError, match="no line above the column names contains 'Length Units,Meters'"):
-        read_export(path, by_preset("motive", "camera"), ("time_s", "displacement_mm"))
-    other = by_preset("motive", "camera", 'above = "Length Units,Millimeters"\nunits = { displacement_mm = "mm" }\n')
-    found, _, _ = read_export(path, other, ("time_s", "displacement_mm"))
-    np.testing.assert_allclose(found["displacement_mm"], 1e-3 * RECORD["displacement_mm"], atol=1e-6)
+@pytest.mark.parametrize(
+    ("program", "stated", "other", "said", "declared_instead", "column", "factor"),
+    [
+        (
+            "vicon", b"\r\n100\r\n", b"\r\n250\r\n", "lacks the column 100 / Frame; it has 250 / Frame",
+            'rate_hz = 250\ncolumns = { time_s = "250 / Frame" }\n', "time_s", 0.4,
+        ),
+        (
+            "motive", b"Units,Meters", b"Units,Millimeters",
+            "no line above the column names contains 'Length Units,Meters'",
+            'above = "Length Units,Millimeters"\nunits = { displacement_mm = "mm" }\n', "displacement_mm", 1e-3,
+        ),
+    ],
+)  # fmt: skip
+def test_an_export_that_states_another_rate_or_unit_than_its_preset_is_refused(
+    tmp_path, program, stated, other, said, declared_instead, column, factor
+):
+    path = written(tmp_path, program, {key: RECORD[key] for key in ("time_s", "displacement_mm")})
+    path.write_bytes(path.read_bytes().replace(stated, other, 1))
+    with pytest.raises(DatasetError, match=said):
+        read_export(path, by_preset(program, "camera"), ("time_s", "displacement_mm"))
+    found, _, _ = read_export(path, by_preset(program, "camera", declared_instead), ("time_s", "displacement_mm"))
+    np.testing.assert_allclose(found[column], factor * RECORD[column], atol=1e-6)
 
 
 @pytest.mark.parametrize(
