@@ -36,7 +36,10 @@ void Commands::begin(StartCause cause) {
 void Commands::poll() {
   const bool was_busy = store_.busy();
   store_.poll();
-  if (was_busy && !store_.busy()) controller_.calibrate(calibration_at_power_up());
+  if (!was_busy || store_.busy()) return;
+  controller_.calibrate(calibration_at_power_up());
+  if (erasing_ && store_.result() == Result::kOk) take_over_soon(factory_preset(0));
+  erasing_ = false;
 }
 
 ParameterSet Commands::at_power_up() {
@@ -89,6 +92,7 @@ Result Commands::schedule_start() {
 
 void Commands::abandon() {
   draft_state_ = Draft::kNone;
+  erasing_ = false;
   schedule_clear();
 }
 
@@ -165,7 +169,8 @@ Result Commands::forget(const char* name) { return store_.forget(name); }
 
 Result Commands::defaults() {
   const Result result = store_.erase_all();
-  return result == Result::kOk ? take_over_soon(factory_preset(0)) : result;
+  if (result == Result::kOk) erasing_ = true;
+  return result;
 }
 
 Result Commands::zero(bool factory) {

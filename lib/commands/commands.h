@@ -26,7 +26,7 @@ class Commands {
   Result schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state);
   Result schedule_start();
 
-  /// Discards what an earlier session left unfinished: an uncommitted set and timed holds.
+  /// Discards what an earlier session left unfinished: an uncommitted set, the loading of defaults and timed holds.
   void abandon();
 
   /// Changes one parameter (value in wire units) at once, also in a set waiting for the cycle boundary.
@@ -46,7 +46,8 @@ class Commands {
   /// Call with each new sample, which shows where in the cycle the robot is.
   void follow(const Sample& sample);
 
-  /// Continues writing the EEPROM. Zero offsets take effect once they are stored, so a failed write changes none.
+  /// Continues writing the EEPROM. Zero offsets take effect once they are stored, and defaults once everything has been
+  /// erased, so a failed write changes neither.
   void poll();
 
   // EEPROM commands: Result::kOk while store().busy() means that the result follows later.
@@ -77,6 +78,7 @@ class Commands {
   ParameterSet draft_;
   Draft draft_state_ = Draft::kNone;
   bool pending_ = false;
+  bool erasing_ = false;  ///< for `defaults`: the baseline is loaded if that succeeds
   bool schedule_spoilt_ = false;
   uint16_t last_phase_ = 0;
 };

@@ -74,6 +74,11 @@ void seal(Record& record) {
   record.check = crc16(bytes_of(record) + 1, offsetof(Record, check) - 1);
 }
 
+bool is_written(uint8_t slot) {
+  const uint16_t address = slot_address(slot);
+  return eeprom_read(address) == kRecordValid && eeprom_read(address + offsetof(Record, format)) != kRecordVoid;
+}
+
 bool is_from_the_future(uint8_t slot) {
   const uint8_t format = eeprom_read(slot_address(slot) + 1);
   return eeprom_read(slot_address(slot)) == kRecordValid && format > kStorageFormat && format != 0xFF;

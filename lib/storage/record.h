@@ -45,6 +45,9 @@ bool read_record(uint8_t slot, Record& record);
 /// Sets format, mark and CRC of a record whose sequence, name and payload are set.
 void seal(Record& record);
 
+/// Whether a slot is neither blank nor voided. Either of two bytes voids it, in case the mark's cell is stuck.
+bool is_written(uint8_t slot);
+
 /// Whether a slot holds a record of a later format than this firmware knows; such records are left alone.
 bool is_from_the_future(uint8_t slot);
 

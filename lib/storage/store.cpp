@@ -78,10 +78,10 @@ uint8_t Store::count() {
   return count;
 }
 
-/// Whether a slot with a valid mark has this name.
+/// Whether a slot that is not void has this name.
 bool Store::is_named(uint8_t slot, const char* name) {
   const uint16_t address = slot_address(slot);
-  if (eeprom_read(address) != kRecordValid) return false;
+  if (!is_written(slot)) return false;
   for (uint8_t i = 0; i < kNameSize; ++i) {
     if (eeprom_read(address + offsetof(Record, name) + i) != static_cast<uint8_t>(name[i])) return false;
   }
@@ -212,7 +212,7 @@ void Store::step_void() {
   for (uint8_t pass = 0; pass < 2; ++pass) {
     for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
       if (!has(slot, kDoomed) || has(slot, kLive) != (pass == 1)) continue;
-      if (eeprom_read(slot_address(slot)) != kRecordValid) {
+      if (!is_written(slot)) {
         marks_[slot] &= ~kDoomed;
         continue;
       }
@@ -220,8 +220,10 @@ void Store::step_void() {
         if (job_ == Job::kSave) continue;  // the new copies count, since they are newer
         return end(Result::kEeprom);
       }
-      marks_[slot] |= kFailed;  // cleared if it reads back as void the next time
-      eeprom_write(slot_address(slot), kRecordVoid);
+      // If it does not read back as void the next time, another byte is tried.
+      const bool stuck = has(slot, kStuck);
+      marks_[slot] |= stuck ? kFailed : kStuck;
+      eeprom_write(slot_address(slot) + (stuck ? offsetof(Record, format) : offsetof(Record, mark)), kRecordVoid);
       return;
     }
   }

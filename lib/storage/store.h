@@ -48,7 +48,8 @@ class Store {
     kLive = 2,    ///< its record is the newest of its name
     kTaken = 4,   ///< not free: written by the job, or belongs to a later firmware
     kDoomed = 8,  ///< will be voided by the job
-    kFailed = 16  ///< did not retain what the job wrote
+    kStuck = 16,  ///< its mark could not be voided
+    kFailed = 32  ///< did not retain what the job wrote
   };
 
   bool has(uint8_t slot, uint8_t mark) const { return marks_[slot] & mark; }

@@ -87,7 +87,10 @@ class DatasetWriter:
                     "move the folder away"
                 )
             return head  # interrupted before the first trial was complete
-        earlier = read_dataset(self.partial)
+        try:
+            earlier = read_dataset(self.partial)
+        except DatasetError as error:
+            raise DatasetError(f"{self.partial} cannot be resumed: {error}") from None
         for what, old, new in (("name", earlier.name, head.name), ("known", earlier.known, head.known)):
             if old != new:
                 raise DatasetError(

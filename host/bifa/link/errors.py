@@ -38,7 +38,8 @@ class MismatchError(LinkError):
 class RefusedError(LinkError):
     """The Uno understood a command and refused it."""
 
-    def __init__(self, command: str, result: int) -> None:
-        """`result`: number of the reason in `RESULTS`."""
-        self.result, words = RESULTS[result] if result < len(RESULTS) else ("?", f"reason {result}")
-        super().__init__(f"the Uno refused {command!r}: {words}")
+    def __init__(self, command: str, number: int, why: str = "") -> None:
+        """`number`: that of the reason in `RESULTS`; `why`: the reason in other words."""
+        self.number = number
+        self.result, words = RESULTS[number] if number < len(RESULTS) else ("?", f"reason {number}")
+        super().__init__(f"the Uno refused {command!r}: {why or words}")

@@ -180,8 +180,8 @@ def _retry_interrupt(lost: "sys.UnraisableHookArgs") -> None:
         _earlier_hook[-1](lost)
 
 
-def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> None:
-    """Send the stop repeatedly until the status returned by `ask(timeout_s)` shows that no valve is on.
+def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> Report:
+    """Send the stop repeatedly until the status returned by `ask(timeout_s)` shows that no valve is on; return it.
 
     Raises NoAnswerError after CONFIRMED_WITHIN_S, and a ConnectionError if the port is gone.
     """
@@ -192,7 +192,7 @@ def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> No
         try:
             status = ask(attempt_s)
             if status["state"] in STOPPED_STATES and status["valves"] == 0:
-                return
+                return status
         except NoAnswerError as error:
             reason = error
         attempt_s = min(2 * attempt_s, deadline - session.clock.now())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from bifa.link import frames, leaving
 from bifa.link.clock_relation import ClockRelation
-from bifa.link.errors import LinkError, NoAnswerError, StillMovingError
+from bifa.link.errors import LinkError, NoAnswerError, RefusedError, StillMovingError
 from bifa.link.session import Counters, Hello, Session, word
 from bifa.link.table import (
     CHAMBER_STATES,
@@ -31,6 +31,13 @@ PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means around this time af
 SAMPLE_US = 1000 * SAMPLE_PERIOD_MS
 DEAD_TIME_S = 1e-3 * (DEAD_TIME_MS + 1)  # venting between the two supplies, including the wait for the tick
 CONNECTIONS = ("off", "positive", "vacuum", "both")  # indexed by the bits of a chamber's two valves
+# Unit of a fault's value and limit, and how many of the Uno's own make one; others have none worth telling.
+FAULT_UNITS = {
+    "over_pressure": ("psi", 1000),
+    "sensor_range": ("psi", 1000),
+    "regulator": ("psi", 1000),
+    "host_silent": ("s", 100),
+}
 LATEST_HOLD_S = (2**32 - 1) / 1000
 _WRAP_US = 1 << 32
 _OLDEST_US = 10_000_000  # by how much a sample may be older than the previous one
@@ -78,6 +85,26 @@ class Status:
     bytes_lost: int
     samples_lost: int
 
+    @property
+    def fault_text(self) -> str:
+        """The fault in words, with where it is, its value and its limit."""
+        words = [self.fault]
+        if self.fault != "none":
+            words += CHAMBERS[self.fault_channel : self.fault_channel + 1]  # none for a fault of the whole robot
+        if self.fault in FAULT_UNITS:
+            unit, scale = FAULT_UNITS[self.fault]
+            words += [f"{self.fault_value / scale:g} {unit}", f"limit {self.fault_limit / scale:g} {unit}"]
+        return ", ".join(words)
+
+    @property
+    def why_stopped(self) -> str:
+        """Why nothing moves until the next clear(), in words."""
+        if self.state == "fault":
+            return f"fault {self.fault_text}"
+        if self.is_emergency_stop_pressed:
+            return "the emergency stop is pressed"
+        return "it was stopped at the Uno: the emergency stop, or a stop sent over the serial line"
+
 
 class Uno:
     """A session with the Uno. As a context manager, it stops the robot however the block ends (bifa.link.leaving).
@@ -95,6 +122,7 @@ class Uno:
         self._clock = clock
         self._samples: deque[Sample] = deque(maxlen=100_000)
         self._time_us: int | None = None
+        self._confirmed_us = -1  # the Uno's time at which a stop was confirmed last
         self._timed_s = 0.0  # host time at which `_time_us` arrived
         self._last_sample: tuple[int, int] | None = None  # its number and time
         self._streaming = False
@@ -131,6 +159,7 @@ class Uno:
         hello = self.session.connect(timeout_s)
         self.clock_relation = ClockRelation()
         self._time_us = None
+        self._confirmed_us = -1
         self._last_sample = None
         self._streaming = False
         for _ in range(EXCHANGES_AT_START):
@@ -259,12 +288,12 @@ class Uno:
     def run(self) -> None:
         """Start walking."""
         self.may_move = True
-        self.session.call("run")
+        self._move("run")
 
     def halt(self) -> None:
         """Stop walking or holding; nothing is latched."""
-        self.session.call("stop")
-        self.may_move = False
+        _, answer = self.session.call_all([("stop", ()), ("status", ())])
+        self._note_confirmed(answer.report)
 
     def stop(self) -> None:
         """Send the real-time stop (all valves off, latched until clear()) repeatedly until the Uno confirms it.
@@ -273,11 +302,16 @@ class Uno:
         turns all valves off).
         """
         try:
-            leaving.stop_until_confirmed(
+            status = leaving.stop_until_confirmed(
                 self.session, lambda attempt_s: self.session.call("status", timeout_s=attempt_s)
             )
         except (ConnectionError, NoAnswerError) as reason:
             raise StillMovingError(reason) from reason
+        self._note_confirmed(status)
+
+    def _note_confirmed(self, status: frames.Report) -> None:
+        """Note that by this status a stop is confirmed. A sample taken before may still arrive, with valves on."""
+        self._confirmed_us = self._unwrap_time(1000 * status["uptime_ms"] % _WRAP_US)
         self.may_move = False
 
     def send_stop(self) -> None:
@@ -286,14 +320,14 @@ class Uno:
 
     def clear(self) -> None:
         """Release a stop, or a fault whose cause is gone."""
-        self.session.call("clear")
+        self._move("clear")
 
     def hold(self, chamber: str, state: str) -> None:
         """Inflate ("positive"), evacuate ("vacuum") or vent ("off") the body, head or tail."""
         fields = _hold_fields(chamber, state)
         if state != "off":
             self.may_move = True
-        self.session.call("hold", *fields)
+        self._move("hold", *fields)
 
     def schedule(self, holds: Iterable[tuple[float, str, str]]) -> None:
         """Start timed holds (time_s, chamber, state), in order of time; the Uno executes them on its own 1 ms ticks.
@@ -306,7 +340,16 @@ class Uno:
             raise UnoParameterError(f"{len(additions)} timed holds; the Uno has room for {SCHEDULE_ENTRIES}")
         self.session.call_all([("schedule_clear", ()), *additions])
         self.may_move = True
-        self.session.call("schedule_start")
+        self._move("schedule_start")
+
+    def _move(self, command: str, *fields: int) -> None:
+        """Call a command that a stop or a fault forbids; a RefusedError then says which it was."""
+        try:
+            self.session.call(command, *fields)
+        except RefusedError as error:
+            if error.result not in ("latched", "fault"):
+                raise
+            raise RefusedError(command, error.number, self.status().why_stopped) from None
 
     # -- telemetry --------------------------------------------------------------------------------------------
 
@@ -382,8 +425,8 @@ class Uno:
 
     def _take_sample(self, report: frames.Report) -> None:
         self.counters.samples += 1
-        self.may_move = self.may_move or report["valves"] != 0
         time_us = self._unwrap_time(report["time_us"])
+        self.may_move = self.may_move or (report["valves"] != 0 and time_us > self._confirmed_us)
         sequence = report["sequence"]
         if self._last_sample is not None:
             sequence = _unwrap_sequence(sequence, time_us, self._last_sample)

@@ -22,7 +22,7 @@ class Conversation:
         """`uno` is connected."""
         self.uno = uno
         self.known = Known()
-        self.latest = Latest()
+        self.latest = Latest(uno)
         self.ended = threading.Event()
         self.error: Exception | None = None
         self._clock = rig.clock

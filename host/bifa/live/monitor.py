@@ -89,7 +89,7 @@ class Monitor:
 
     def __init__(self, uno: Uno) -> None:
         self._uno = uno
-        self._latest = Latest()
+        self._latest = Latest(uno)
         self._trace = Trace()
 
     def take(self, samples: list[Sample]) -> None:
@@ -117,7 +117,8 @@ class Monitor:
                 dial(sample.phase_rad[i]),
             )
         state = f"{sample.state}  {sample.time_us / 1e6:.1f} s" if sample else "no telemetry yet"
-        head = Text.assemble((f"{state}  ", "bold"), (self._latest.warning, "bold red"))
+        wrong = "  ".join(filter(None, (self._latest.fault, self._latest.warning)))
+        head = Text.assemble((f"{state}  ", "bold"), (wrong, "bold red"))
         link = Text(self._uno.counters.text(), "dim")
         return Panel(Group(head, table, link), title="bifa monitor")
 

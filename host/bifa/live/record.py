@@ -16,7 +16,7 @@ from rich.progress import Progress
 from rich.status import Status
 
 from bifa.errors import BifaError
-from bifa.link import RefusedError, Sample, Uno
+from bifa.link import RefusedError, Sample, StillMovingError, Uno
 from bifa.link.table import CHAMBERS, MARK_PAUSE
 from bifa.live.walk import raise_if_no_reader, stopped_text
 from bifa.lock import locked
@@ -27,6 +27,7 @@ from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
 
 MAX_RESTARTS = 3  # most restarts while the port is away; a board that keeps its power counts each in its boot number
+_CHOICE = "Press Enter to walk again; q ends."
 HEADER = [
     "time_s",
     "host_time_s",
@@ -108,24 +109,30 @@ def record_telemetry(
                 except GONE as error:
                     if isinstance(error.__cause__, KeyboardInterrupt) or not log.has_begun:
                         raise
+                    if isinstance(error, StillMovingError):
+                        log.unconfirmed = error
                     if path.exists() or not is_told:
                         console.print(f"{error}\nwhat was recorded is in {out}; {waiting}", soft_wrap=True)
                         is_told = True
                     time.sleep(RETRY_S)
     except KeyboardInterrupt:
         console.print("ended")
+    if log.unconfirmed is not None:
+        raise log.unconfirmed
     console.print(f"{out} holds the telemetry; a data set also needs the displacement from your own instrument")
 
 
 @dataclass
 class _TelemetryLog:
-    """Recorder for one particular board, which walks without being asked only the first time."""
+    """Recorder for one particular board, which walks without being asked only the first time. `unconfirmed`: the error
+    of a stop that was not confirmed, until the board is back."""
 
     _board: SameBoard
     _parameters: dict[str, float]
     _end_s: float
     _console: Console
     _desk: Desk
+    unconfirmed: StillMovingError | None = None
     _nonce: int | None = None  # boot number of the last start that was seen; None before the first
 
     @property
@@ -159,6 +166,7 @@ class _TelemetryLog:
     def _greet(self, uno: Uno) -> str:
         """Connect; return in words whether this is known to be the board that was recorded before."""
         nonce = uno.connect().boot_nonce
+        self.unconfirmed = None
         followed = self._nonce is not None and 0 <= (nonce - self._nonce) % 65536 <= MAX_RESTARTS
         self._nonce = nonce
         if self._board.serial_number or followed:
@@ -167,7 +175,7 @@ class _TelemetryLog:
 
     def _ask(self, known: str) -> None:
         if sys.stdin is not None and sys.stdin.isatty():
-            self._desk.ask("walk", f"{known}. Recording continues. Press Enter to walk again; q ends.")
+            self._desk.ask("walk", f"{known}. Recording continues. {_CHOICE}")
             return
         self._console.print(
             f"{known}: recording without walking, since no one can be asked; to walk, run the command again"
@@ -202,7 +210,7 @@ class _TelemetryLog:
             uno.clear()  # if opening the port did not restart it, it is still stopped
             uno.run()
         except RefusedError as error:
-            self._console.print(str(error))
+            self._desk.ask("walk", f"{error}. {_CHOICE}")
 
 
 def next_file(out: Path) -> Path:

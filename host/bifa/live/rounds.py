@@ -2,7 +2,7 @@
 
 import time
 
-from bifa.link import Clock, Sample
+from bifa.link import Clock, Sample, Uno
 
 LARGEST_LAG_S = 0.2
 STALE_S = 1.0
@@ -25,15 +25,22 @@ class Pace:
 
 
 class Latest:
-    """The newest sample (None until the first) and its age, so that stale data never look live."""
+    """The newest sample (None until the first) and its age, so that stale data never look live; and the fault in words,
+    while there is one: whoever opens the port later no longer finds it."""
 
-    def __init__(self) -> None:
+    def __init__(self, uno: Uno) -> None:
+        self._uno = uno
         self.sample: Sample | None = None
+        self.fault = ""
         self._taken_s = time.monotonic()
 
     def take(self, samples: list[Sample]) -> None:
         """Keep the last one."""
         if samples:
+            if samples[-1].state != "fault":
+                self.fault = ""
+            elif not self.fault:
+                self.fault = self._uno.status().fault_text
             self.sample, self._taken_s = samples[-1], time.monotonic()
 
     @property

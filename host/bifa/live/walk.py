@@ -28,7 +28,7 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
         raise_if_no_reader()
         status = uno.status()
         if status.state != "running":
-            raise LinkError(f"{stopped_text(status)}; see bifa console")
+            raise LinkError(stopped_text(status))
         walked_s = clock.now() - began_s
         pressures = "  ".join(f"{name} {psi:+.1f}" for name, psi in zip(CHAMBERS, status.pressure_psi, strict=True))
         on_progress(f"walking: {walked_s:.0f}{until} s, cycle {int(walked_s / period_s) + 1}, psi: {pressures}")
@@ -37,7 +37,7 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
 
 def stopped_text(status: Status) -> str:
     """Say that the robot no longer walks, and why."""
-    return f"the robot stopped walking (state: {status.state}, fault: {status.fault})"
+    return f"the robot stopped walking (state: {status.state}, fault: {status.fault_text})"
 
 
 def raise_if_no_reader() -> None:

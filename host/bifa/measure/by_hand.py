@@ -14,7 +14,7 @@ from bifa.data import DatasetWriter, Trial
 from bifa.data.export import Export
 from bifa.data.layout import RAW
 from bifa.errors import BifaError
-from bifa.link import LinkError, PortGoneError, Uno
+from bifa.link import LinkError, PortGoneError, RefusedError, Uno
 from bifa.measure.desk import Desk, NobodyError
 from bifa.measure.experiments import Progress, record_trial
 from bifa.measure.own_instruments import OwnInstruments, Turn
@@ -72,16 +72,27 @@ class ByHand:
             self._desk.say(f"\nTrial {turn.number} of {turn.total}: {turn.planned.title}")
             try:
                 trial = record_trial(bench, uno, turn.planned, on_progress, attempts=1)
+            except RefusedError as error:
+                self._try_again(bench, uno, turn, error)
+                continue
             except (LinkError, PortGoneError, NobodyError):
                 raise
             except BifaError as error:
-                uno.halt()
-                self._review(bench, uno, turn, f"Not usable: {error}.", "Enter tries again")
-                uno.clear()  # it may have been stopped; the next prompt asks whether valves may switch
+                self._try_again(bench, uno, turn, error)
                 continue
             if self._accepted(bench, uno, turn, trial, writer):
                 self._instruments.keep(writer.partial / RAW)
                 return trial
+
+    def _try_again(self, bench: Bench, uno: Uno, turn: Turn, error: BifaError) -> None:
+        """Say why a trial is not usable, until the person wants to try again and nothing forbids that any longer."""
+        uno.halt()
+        while True:
+            self._review(bench, uno, turn, f"Not usable: {error}.", "Enter tries again")
+            try:
+                return uno.clear()  # it may have been stopped; the next prompt asks whether valves may switch
+            except RefusedError as refusal:
+                error = refusal
 
     def _accepted(self, bench: Bench, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
         for line in text_plot(trial, self._plain, self._columns):

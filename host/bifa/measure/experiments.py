@@ -52,6 +52,10 @@ def record_trial(
         except AlignmentError as error:
             why = str(error)
             continue
+        except DisturbedError as error:
+            if (status := uno.status()).state != "fault":
+                raise
+            raise DisturbedError(f"{error} ({status.why_stopped})") from None
         if not lost:
             commanded_psi = uno.get("pressure_psi") if planned.pressure_psi is None else planned.pressure_psi
             return planned.as_trial(columns, extra=extra | set_point(commanded_psi))

@@ -83,8 +83,8 @@ def run_session(
             hello = uno.connect()
             writer = DatasetWriter(folder, name, known, {**provenance, "firmware": hello.firmware}, resume=True)
             refuse_other_settings(writer, provenance)
-            if writer.trials and (resume := getattr(rig, "resume", None)):
-                resume(len(writer.trials))
+            if writer.trials:
+                rig.resume(len(writer.trials))
             uno.clear()
             for number, planned in enumerate(trials, start=1):
                 if writer.has(planned.as_trial()):

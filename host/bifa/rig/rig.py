@@ -23,7 +23,6 @@ class Rig(Protocol):
     """A transport and a clock that belong together, and the bench's instruments, if any.
 
     `known`: values measured directly on this rig's robot, by the model's names (`head_mass_kg`); may be empty.
-    `resume(recorded)`, optional: called where an interrupted session goes on that has recorded so many trials.
     """
 
     transport: Transport
@@ -34,6 +33,9 @@ class Rig(Protocol):
     def next_session_seed(self) -> int | None:
         """Return a seed for the next session's key, so that every byte of the session is repeatable; None on a rig in
         real time, which is not repeatable anyway."""
+
+    def resume(self, recorded: int) -> None:
+        """Prepare to continue an interrupted session that has recorded so many trials; most rigs have nothing to do."""
 
     def close(self) -> None:
         """Release all resources; a second call does nothing."""
@@ -54,6 +56,9 @@ class SerialRig:
         self.clock: Clock = WallClock()
 
     def next_session_seed(self) -> None:
+        """See Rig."""
+
+    def resume(self, recorded: int) -> None:
         """See Rig."""
 
     def close(self) -> None:

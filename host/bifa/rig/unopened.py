@@ -32,7 +32,11 @@ def holder_of(port: str) -> str | None:
     pid = _locked_by(port) or _opened_by(port)
     if pid is None:
         return None
-    words = (_PROC / str(pid) / "cmdline").read_bytes().rstrip(b"\0").decode("utf-8", "replace").split("\0")
+    try:
+        command = (_PROC / str(pid) / "cmdline").read_bytes()
+    except OSError:  # it has just ended, or the system does not show what others run
+        return f"process {pid}"
+    words = command.rstrip(b"\0").decode("utf-8", "replace").split("\0")
     if Path(words[0]).name.startswith("python") and len(words) > 1:  # name the script, not the interpreter
         words = ["bifa", *words[3:]] if words[1:3] == ["-m", "bifa"] else words[1:]
     return f"`{shlex.join([Path(words[0]).name, *words[1:]])}` (process {pid})"

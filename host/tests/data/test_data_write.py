@@ -165,6 +165,15 @@ def test_trials_that_are_not_listed_any_more_are_not_recorded_over(tmp_path):
         DatasetWriter(tmp_path / "day", "no table", resume=True)
 
 
+def test_a_session_that_cannot_be_read_is_named_with_its_folder(tmp_path):
+    writer = DatasetWriter(tmp_path / "day", "odd")
+    writer.add(make_trial())
+    table = writer.partial / "dataset.toml"
+    table.write_text(table.read_text().replace("format = 1", "format = 9"))
+    with pytest.raises(DatasetError, match=r"day\.partial cannot be resumed: dataset\.toml, .*format 9"):
+        DatasetWriter(tmp_path / "day", "odd", resume=True)
+
+
 def test_settings_stay_keys_of_the_trial(tmp_path):
     trial = make_trial("anchor_pull", extra={"load_cell_N_m": 4800.0, "direction": "backward", "room_degC": 21.0})
     folder = write_dataset(tmp_path / "set", Dataset(None, "settings", {}, (trial,)))

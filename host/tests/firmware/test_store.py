@@ -222,6 +222,22 @@ def test_cells_that_keep_nothing_are_passed_over():
     assert bench.load("alpha") == parameter_set(1)
 
 
+def test_what_is_forgotten_is_gone_though_any_single_cell_keeps_what_it_holds():
+    """The record's mark included, which alone would keep it valid."""
+    image = furnished()
+    for address in range(SIZE):
+        bench = Bench(image)
+        bench.stick(address, image[address])
+        assert bench.forget("alpha") == OK, address
+        assert bench.forget("alpha") == NO_PRESET
+        assert "alpha" not in Bench(bench.image()).names()
+        assert bench.save("alpha", parameter_set(5)) == OK
+        assert Bench(bench.image()).load("alpha") == parameter_set(5)
+        assert bench.erase() == OK, address
+        after = Bench(bench.image())
+        assert (after.names(), after.settings()) == ([], None)
+
+
 @pytest.mark.parametrize("dead", [1, 3, 20, 100, SIZE])
 def test_an_answer_is_true_however_many_cells_keep_what_they_hold(dead):
     """`ok`: the new content is there after a restart. An error: the old one is. Others are never touched."""

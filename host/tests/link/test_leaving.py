@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 
+import numpy as np
 import pytest
 
 from bifa.link import PortGoneError, RefusedError, StillMovingError, Uno, leaving
@@ -273,3 +274,18 @@ def test_only_a_robot_that_was_moved_gives_an_alarm_where_the_port_vanishes(boar
     with pytest.raises(error) as told:
         unplugged()
     assert type(told.value) is error
+
+
+@pytest.mark.uno
+@pytest.mark.parametrize("stop", [Uno.halt, Uno.stop])
+def test_a_confirmed_stop_is_not_forgotten_because_an_older_sample_comes_after_it(rig, stop):
+    with Uno(rig.transport, rig.clock, seed=1) as uno:
+        uno.connect()
+        uno.stream(True)
+        for at_s in np.arange(0.3, 0.31, 0.0007):
+            uno.clear()
+            uno.run()
+            uno.samples(at_s)
+            stop(uno)
+            uno.samples(0.05)
+            assert not uno.may_move, at_s

@@ -142,6 +142,16 @@ def test_a_robot_that_is_gone_while_nobody_watches_ends_the_command(walking):
     assert "MAY STILL BE MOVING" in said
 
 
+def test_who_ends_it_while_a_robot_that_may_move_is_gone_is_not_told_that_the_valves_are_off(walking):
+    page = WebSocket(walking.port, walking.token)
+    walking.uno.unplug()
+    page.until(lambda state: state["gone"])
+    assert walking.interrupt() == 2
+    *_, last = walking.process.stdout.read().splitlines()
+    assert last.startswith("THE ROBOT MAY STILL BE MOVING")
+    page.close()
+
+
 def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(monitor, tab):
     bifa = monitor("--run")
     page = tab(bifa.url)

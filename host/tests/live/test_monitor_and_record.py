@@ -4,6 +4,7 @@ import _thread
 import csv
 import io
 import math
+import re
 import signal
 import sys
 import threading
@@ -51,6 +52,17 @@ def test_the_trace_is_as_long_as_it_says():
     body = next(line for line in shown.getvalue().splitlines() if "body" in line)
     assert "last 0.9 s" in shown.getvalue()
     assert body.count("▄") == 10  # one block, at 0 psi, per 0.1 s
+
+
+def test_the_monitor_shows_which_fault_there_is():
+    board, shown = Board(), io.StringIO()
+
+    def walk_unheard(uno):
+        uno.run()
+        board.sleep(3.0)
+
+    watch(Uno(board, board), board, Console(file=shown, width=80), 1.0, walk_unheard)
+    assert re.search(r"fault  \d\.\d s  host_silent, 2 s, limit 2 s", shown.getvalue())
 
 
 @pytest.mark.parametrize("width", [60, 80, 200])
@@ -128,6 +140,18 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
     unos[1].unplug()
 
 
+def test_who_ends_a_recording_while_a_robot_that_may_move_is_gone_is_reminded(uno, gait, tmp_path):
+    out = tmp_path / "out"
+    with Terminal(tmp_path, "record", "--out", str(out), "--port", uno.device, "--gait", gait) as terminal:
+        terminal.until(lambda: uno.board.state == "running" and uno.board.valves != 0)
+        uno.unplug()
+        terminal.sees("recording resumes when that Uno is back")
+        terminal.presses("\x03")
+        assert terminal.exit_status() == 2
+        terminal.sees("ended")
+        assert sum("MAY STILL BE MOVING" in line for line in terminal.look()) == 2
+
+
 def test_a_restart_never_walks_and_a_person_is_asked(uno, gait, tmp_path):
     out = tmp_path / "out"
     with Terminal(tmp_path, "record", "--out", str(out), "--port", uno.device, "--gait", gait) as terminal:
@@ -140,6 +164,11 @@ def test_a_restart_never_walks_and_a_person_is_asked(uno, gait, tmp_path):
         uno.wait(3.0)
         assert (uno.board.valves, uno.driven_s) == (0, driven_s), "it waits for the user"
         assert len(rows(out / "telemetry_2.csv")) > 50, "telemetry is recorded meanwhile"
+        uno.board.write(b"clear\nhold body vacuum\n")
+        terminal.until(lambda: uno.board.state == "holding")
+        terminal.presses("\n")
+        terminal.sees("the Uno refused 'run': not in this state; type stop first. Press Enter to walk")
+        uno.board.write(b"stop\n")
         terminal.presses("\n")
         terminal.until(lambda: uno.board.state == "running")
         terminal.presses("\x03")

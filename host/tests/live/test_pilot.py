@@ -222,3 +222,19 @@ def test_why_a_robot_stopped_that_nobody_here_stopped_is_told():
     _, reports, _ = flown(during, 0.6, lambda uno: uno.run(), board)
     assert reports[-1]["robot"] == "stopped"
     assert "at the Uno" in reports[-1]["stopped"]["why"]
+
+
+def test_which_fault_there_is_is_told_also_after_somebody_has_stopped_the_robot():
+    board, asked = Board(), []
+
+    def during(pilot, report):
+        if report.get("robot") == "running" and not asked:
+            asked.append(None)
+            board.sleep(3.0)  # nobody is heard from
+        elif report.get("fault") and len(asked) == 1:
+            asked.append(pilot.stop())
+
+    _, reports, _ = flown(during, 5.0, lambda uno: uno.run(), board)
+    assert reports[-1]["fault"] == "host_silent, 2 s, limit 2 s"
+    told = [report["stopped"] for report in reports if report.get("stopped")]
+    assert (told[0]["why"], told[-1]["by"]) == ("fault host_silent, 2 s, limit 2 s", "a page")

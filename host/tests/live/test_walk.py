@@ -31,3 +31,11 @@ def test_a_robot_that_stops_by_itself_ends_it_with_its_state():
 
         with pytest.raises(LinkError, match=r"the robot stopped walking \(state: stopped"):
             walk(uno, board, 5.0, press)
+
+
+def test_a_fault_that_ends_it_is_told_with_its_value_and_limit():
+    board = Board()
+    with Uno(board, board) as uno:
+        uno.connect()
+        with pytest.raises(LinkError, match=r"\(state: fault, fault: host_silent, 2 s, limit 2 s\)$"):
+            walk(uno, board, 60.0, lambda said: board.sleep(3.0))

@@ -223,3 +223,26 @@ def test_a_trial_that_was_stopped_is_not_kept_and_is_tried_again_once_somebody_s
     assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
     assert "Not usable: " in "\n".join(here.said)
     assert "the robot was stopped instead of holding" in "\n".join(here.said)
+
+
+def test_a_fault_whose_cause_is_still_there_is_asked_about_again(bench, tmp_path):
+    here = bench()
+    move, moved, reviewed = here.lab.move, [], []
+
+    def unplug_once(asked):
+        if not moved:
+            here.rig.break_sensor("head", 0.0)
+        moved.append(1)
+        return move(asked)
+
+    def plug_in_at_the_second(asked):
+        reviewed.append(1)
+        if len(reviewed) == 2:
+            here.rig.break_sensor("head", None)
+        return ""
+
+    here.lab.move, here.lab.review = unplug_once, plug_in_at_the_second
+    assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
+    said = "\n".join(here.said)
+    assert "(fault sensor_range, head, -" in said
+    assert "Not usable: the Uno refused 'clear': fault sensor_range, head, -" in said

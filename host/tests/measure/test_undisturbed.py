@@ -46,8 +46,31 @@ def test_a_trial_within_which_somebody_stopped_the_robot_is_refused(recorded, pl
 @pytest.mark.uno
 @pytest.mark.parametrize("planned", TRIALS[2:], ids=lambda planned: planned.title)
 def test_a_trial_within_which_a_fault_tripped_is_refused(recorded, planned):
-    with pytest.raises(DisturbedError, match="fault"):
+    with pytest.raises(DisturbedError, match=r"the robot was fault .*\(fault sensor_range, head, [\d.]+ psi, limit "):
         recorded(lambda rig, uno: rig.break_sensor("head", 5.0), planned, 0.8)
+
+
+@pytest.mark.uno
+def test_what_a_latched_robot_refuses_names_the_fault_or_the_emergency_stop(rig, uno):
+    moves = {"run": uno.run, "clear": uno.clear, "hold": lambda: uno.hold("body", "vacuum")}
+    moves["schedule_start"] = lambda: uno.schedule([(0.0, "body", "vacuum")])
+    rig.break_sensor("head", 0.0)
+    rig.clock.sleep(0.2)
+    for name, move in moves.items():
+        with pytest.raises(RefusedError, match=f"'{name}': fault sensor_range, head, -[\\d.]+ psi, limit -"):
+            move()
+    rig.break_sensor("head", None)
+    rig.clock.sleep(0.1)
+    uno.clear()
+    rig.uno.press_emergency_stop()
+    rig.clock.sleep(0.1)
+    for name, move in moves.items():
+        with pytest.raises(RefusedError, match=f"'{name}': the emergency stop is pressed"):
+            move()
+    rig.uno.press_emergency_stop(False)
+    rig.clock.sleep(0.1)
+    with pytest.raises(RefusedError, match="'run': it was stopped at the Uno"):
+        uno.run()
 
 
 @pytest.mark.uno

@@ -17,7 +17,7 @@ from tests.report import sample
 pytestmark = pytest.mark.real_time
 
 LOOKS = Path(__file__).with_name("looks.js").read_text(encoding="utf-8")
-WIDE, NARROW = 1280, 390
+WIDE, MIDDLE, NARROW = 1280, 1000, 390
 _INK = "document.querySelector('.plot').charts[0].options.scales.x.ticks.color"  # color of the plots' text
 
 
@@ -85,7 +85,7 @@ def opened(tabs):
 
 @pytest.mark.parametrize("name", ["campaign", "compare", "diagnosis", "engine"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [WIDE, NARROW])
+@pytest.mark.parametrize("width", [WIDE, MIDDLE, NARROW])
 def test_nothing_overlaps_is_cut_off_or_too_pale(opened, name, width, scheme):
     page = opened(name, width, scheme)
     assert page.evaluate(LOOKS) == []

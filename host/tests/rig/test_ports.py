@@ -3,7 +3,7 @@
 import pytest
 
 from bifa.link import PortGoneError, Uno
-from bifa.rig import RigError, SerialRig, open_rig
+from bifa.rig import Rig, RigError, SerialRig, open_rig
 from harness.pty_uno import PtyUno
 
 
@@ -17,6 +17,7 @@ def test_wrong_ports_are_named():
 def test_a_serial_port_exclusive_and_unplugged():
     plugged = PtyUno()
     with SerialRig(plugged.device) as rig:
+        assert isinstance(rig, Rig), "it has whatever a session asks of a rig"
         uno = Uno(rig.transport, rig.clock)
         uno.connect()
         uno.set("period_s", 3.0)

@@ -79,6 +79,15 @@ def test_who_keeps_the_lock_of_a_program_that_has_ended_is_named(port):
         assert f"process {program.pid}" not in holder
 
 
+def test_a_process_whose_command_the_system_does_not_show_is_named_by_its_number(port, tmp_path, monkeypatch):
+    stat = os.stat(port)
+    place = f"{os.major(stat.st_dev):02x}:{os.minor(stat.st_dev):02x}:{stat.st_ino}"
+    (tmp_path / "4711").mkdir()
+    (tmp_path / "locks").write_text(f"1: FLOCK ADVISORY WRITE 4711 {place} 0 EOF\n")
+    monkeypatch.setattr("bifa.rig.unopened._PROC", tmp_path)
+    assert holder_of(port) == "process 4711"
+
+
 def test_a_command_of_bifa_is_named_as_it_is_typed(port, tmp_path):
     record = [sys.executable, "-m", "bifa", "record", "--port", port, "--out", str(tmp_path / "telemetry")]
     with subprocess.Popen(record, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as program:

@@ -433,6 +433,13 @@ void test_presets_are_saved_loaded_listed_and_forgotten_by_names_of_full_length(
   equal(Result::kNoPreset, bench.call(MessageId::kLoad, load));
 }
 
+/// Changes the period to one that no preset has.
+uint32_t change_period(Bench& bench) {
+  const uint32_t kPeriod_us = 1234000;
+  equal(Result::kOk, bench.commands.set(ParameterId::kPeriodS, kPeriod_us));
+  return kPeriod_us;
+}
+
 void test_defaults_and_zero_write_the_eeprom() {
   Bench bench;
   bench.connect();
@@ -447,9 +454,32 @@ void test_defaults_and_zero_write_the_eeprom() {
   bench.wait(2000);
   equal(Result::kOk, done(bench.sequence++));
   TEST_ASSERT_EQUAL_INT16(0, bench.controller.calibration().offset_mpsi[0]);
+  change_period(bench);
   bench.take(MessageId::kDefaults, bench.sequence);
   bench.wait(5000);
   equal(Result::kOk, done(bench.sequence++));
+  TEST_ASSERT_EQUAL_UINT32(factory_preset(0).period_us, bench.commands.wanted().period_us);
+}
+
+void test_defaults_that_cannot_be_erased_or_are_abandoned_leave_the_set() {
+  for (const bool abandoned : {false, true}) {
+    Bench bench;
+    bench.connect();
+    const uint32_t period_us = change_period(bench);
+    bench.take(MessageId::kSave, bench.sequence++, SaveMessage{{'a'}});
+    bench.wait(2000);
+    uint8_t worn[kEepromBytes];
+    memcpy(worn, cells, sizeof cells);
+    bench.take(MessageId::kDefaults, bench.sequence);
+    if (abandoned) bench.connect(kKey + 1);
+    sent.clear();
+    for (uint16_t ms = 0; ms < 2000; ++ms) {
+      if (!abandoned) memcpy(cells, worn, sizeof cells);  // no cell retains a write
+      bench.wait(1);
+    }
+    if (!abandoned) equal(Result::kEeprom, done(bench.sequence));
+    TEST_ASSERT_EQUAL_UINT32(period_us, bench.commands.wanted().period_us);
+  }
 }
 
 void test_timed_holds_are_added_started_and_cleared() {
@@ -647,6 +677,7 @@ void run() {
   RUN_TEST(test_sets_are_begun_filled_and_committed);
   RUN_TEST(test_presets_are_saved_loaded_listed_and_forgotten_by_names_of_full_length);
   RUN_TEST(test_defaults_and_zero_write_the_eeprom);
+  RUN_TEST(test_defaults_that_cannot_be_erased_or_are_abandoned_leave_the_set);
   RUN_TEST(test_timed_holds_are_added_started_and_cleared);
   RUN_TEST(test_a_session_is_guarded_and_a_bare_terminal_is_not);
   RUN_TEST(test_clock_is_the_time_and_the_marked_sample);

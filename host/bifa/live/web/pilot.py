@@ -233,7 +233,7 @@ class _Flight:
     ) -> None:
         self._pilot, self._uno, self._clock, self._tell = pilot, uno, clock, tell
         self._position_mm = position_mm
-        self._latest, self._speed = Latest(), CycleSpeed()
+        self._latest, self._speed = Latest(uno), CycleSpeed()
         self._state = ""
         self._settings: dict[str, Any] = {}
 
@@ -286,7 +286,7 @@ class _Flight:
         state = self._latest.sample.state if self._latest.sample else ""
         if state != self._state:
             if self._state in MOVING and state not in MOVING and self._pilot.stopped is None:
-                self._pilot.stopped_by_itself(_stop_reason(self._uno))
+                self._pilot.stopped_by_itself(self._uno.status().why_stopped)
             elif state in MOVING:
                 self._pilot.clear_stopped()
             self._state = state
@@ -299,6 +299,7 @@ class _Flight:
             "gone": "",
             "link": self._uno.counters.text(),
             "warning": self._latest.warning,
+            "fault": self._latest.fault,
             "stopped": self._pilot.stopped,
             **self._settings,
         }
@@ -322,15 +323,6 @@ def _requested_stop(by: str) -> dict[str, Any]:
 
 def _spontaneous_stop(why: str) -> dict[str, Any]:
     return {"by": "", "at": wall_clock(), "is_confirmed": True, "why": why}
-
-
-def _stop_reason(uno: Uno) -> str:
-    status = uno.status()
-    if status.state == "fault":
-        return f"fault {status.fault}: see `status` in bifa console"
-    if status.is_emergency_stop_pressed:
-        return "the emergency stop was pressed"
-    return "it was stopped at the Uno: the emergency stop, or a stop sent over the serial line"
 
 
 def _chambers(sample: Sample) -> dict[str, dict[str, Any]]:

@@ -137,7 +137,7 @@
   };
 
   const show = () => {
-    tell(state, live.gone ? "the link to the robot is lost" : (live.robot === "connecting" ? "waiting for the robot" : live.warning ? `${live.robot}: ${live.warning}` : live.robot));
+    tell(state, live.gone ? "the link to the robot is lost" : (live.robot === "connecting" ? "waiting for the robot" : [live.robot, live.fault, live.warning].filter(Boolean).join(": ")));
     tell(clock, live.gone || live.uno_s === undefined ? "" : `, ${live.uno_s.toFixed(1)} s`);
     state.classList.toggle("wrong", Boolean(live.gone || live.warning));
     document.body.classList.toggle("old", Boolean(live.gone));
