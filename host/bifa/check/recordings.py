@@ -16,6 +16,7 @@ from .lag import displacement_lag, misfit, session_misfit
 SENSOR_SPAN_PSI = 15.0  # Honeywell ABP...015PD: +-15 psi; beyond it the output is not specified
 ADC_LIMITS_PSI = (-18.75, 18.75)  # counts 0 and 1023, since 10-90 % of the supply span 30 psi
 REPEATS_WANTED = 3  # as in the paper's section IV
+SHORT_SHARE = 0.75  # of how long the other repeats last: a record cut off, as when the power fails
 MOTION_MM = 1.0  # every experiment moves by more than this (strokes of 30 and 54 mm)
 FLAT_SAMPLES = 8  # repetitions in a row of an extreme value, in a channel that otherwise hardly repeats a value
 SPIKE_MM = 5.0  # there and back within two samples; a snap-through does not come back
@@ -32,10 +33,6 @@ def check_recording(trial: Trial) -> list[Finding]:
     return [found for check in TRIAL_CHECKS for found in check(trial)]
 
 
-def _line(row: int) -> int:
-    return int(row) + 2
-
-
 def _columns(trial: Trial, *kinds: str) -> Iterator[tuple[str, np.ndarray]]:
     """Name and values of the columns of these quantities, such as "pressure"."""
     return ((name, values) for name, values in trial.columns.items() if name.startswith(kinds))
@@ -47,13 +44,13 @@ def _saturated_pressure(trial: Trial) -> Iterator[Finding]:
         rows = np.flatnonzero((values <= low) | (values >= high))
         if rows.size:
             text = f"{rows.size} samples at the ADC's limit of {high:g} psi: saturated, or the sensor is broken"
-            yield Finding("saturated", text, trial.file, _line(rows[0]), name)
+            yield Finding("saturated", text, trial.file, trial.line(rows[0]), name)
             continue
         rows = np.flatnonzero(np.abs(values) > SENSOR_SPAN_PSI)
         if rows.size:
             worst = values[rows][np.argmax(np.abs(values[rows]))]
             text = f"{rows.size} samples beyond the sensor's +-{SENSOR_SPAN_PSI:g} psi, up to {worst:.2f}"
-            yield Finding("clipped", text, trial.file, _line(rows[0]), name)
+            yield Finding("clipped", text, trial.file, trial.line(rows[0]), name)
 
 
 def _clipped_instrument(trial: Trial) -> Iterator[Finding]:
@@ -66,7 +63,7 @@ def _clipped_instrument(trial: Trial) -> Iterator[Finding]:
             elsewhere = np.mean(same[~flat]) if (~flat).any() else 1.0
             if end - row >= FLAT_SAMPLES and elsewhere < 0.05:
                 text = f"{end - row + 1} samples in a row read exactly {extreme:g}: the sensor is clipped"
-                yield Finding("clipped", text, trial.file, _line(row), name)
+                yield Finding("clipped", text, trial.file, trial.line(row), name)
 
 
 def _stuck_channel(trial: Trial) -> Iterator[Finding]:
@@ -82,7 +79,7 @@ def _spikes(trial: Trial) -> Iterator[Finding]:
         rows = np.flatnonzero((there * back < 0) & (np.minimum(np.abs(there), np.abs(back)) > SPIKE_MM)) + 1
         if rows.size:
             text = f"{rows.size} single samples jump by over {SPIKE_MM:g} mm and back: lost markers?"
-            yield Finding("spike", text, trial.file, _line(rows[0]), name)
+            yield Finding("spike", text, trial.file, trial.line(rows[0]), name)
 
 
 def _no_value(trial: Trial) -> Iterator[Finding]:
@@ -90,7 +87,7 @@ def _no_value(trial: Trial) -> Iterator[Finding]:
         rows = np.flatnonzero(codes(values)) if name != "time_s" else np.array([])
         if rows.size:
             text = f"{rows.size} samples read {values[rows[0]]:g}, a code for a missing value: record it again"
-            yield Finding("no value", text, trial.file, _line(rows[0]), name)
+            yield Finding("no value", text, trial.file, trial.line(rows[0]), name)
 
 
 def _held_marker(trial: Trial) -> Iterator[Finding]:
@@ -100,7 +97,7 @@ def _held_marker(trial: Trial) -> Iterator[Finding]:
         rows = np.flatnonzero(held(values))
         if rows.size:
             text = f"{rows.size} samples repeat the one before and then jump: a marker was lost, and held or set to 0"
-            yield Finding("held", text, trial.file, _line(rows[0]), name)
+            yield Finding("held", text, trial.file, trial.line(rows[0]), name)
 
 
 def _clock(trial: Trial) -> Iterator[Finding]:
@@ -118,11 +115,11 @@ def _clock(trial: Trial) -> Iterator[Finding]:
     if rows.size:
         missing = int(np.round(step[rows] / median - 1).sum())
         text = f"the clock jumps {rows.size} times, by up to {step[rows].max():.3f} s; about {missing} samples missing"
-        yield Finding("clock jump", text, trial.file, _line(rows[0] + 1), "time_s")
+        yield Finding("clock jump", text, trial.file, trial.line(rows[0] + 1), "time_s")
     rows = np.flatnonzero(step < 0.5 * median)
     if rows.size:
         text = f"{rows.size} samples follow within half a sampling period, the closest after {step[rows].min():.6f} s"
-        yield Finding("clock jump", text, trial.file, _line(rows[0] + 1), "time_s")
+        yield Finding("clock jump", text, trial.file, trial.line(rows[0] + 1), "time_s")
 
 
 def _no_motion(trial: Trial) -> Iterator[Finding]:
@@ -145,9 +142,9 @@ def _start(trial: Trial) -> Iterator[Finding]:
         share = 0.25 if trial.experiment == "step_response" else 0.1
         if abs(values[0]) > 2.0 + share * np.ptp(values):
             text = f"begins at {values[0]:.2f} mm: displacement is 0 at the contracted state"
-            yield Finding("start", text, trial.file, 2, name)
+            yield Finding("start", text, trial.file, trial.line(0), name)
     if trial.experiment == "step_response" and trial.columns["command"][0] != 0:
-        yield Finding("start", "begins under pressure, not under vacuum", trial.file, 2, "command")
+        yield Finding("start", "begins under pressure, not under vacuum", trial.file, trial.line(0), "command")
 
 
 def _commanded_pressure(trial: Trial) -> Iterator[Finding]:
@@ -170,6 +167,16 @@ def _missing_repeats(dataset: Dataset) -> Iterator[Finding]:
             which = f"repeat {absent[0]} is" if len(absent) == 1 else f"repeats {', '.join(map(str, absent))} are"
             text = f"{which} missing; {why}"
             yield Finding("missing repeats", text, condition=called[group[0].file])
+
+
+def _short_repeats(dataset: Dataset) -> Iterator[Finding]:
+    for group in dataset.repeats():
+        lasts_s = [float(np.ptp(trial.time_s)) for trial in group]
+        for place, trial in enumerate(group):
+            others_s = lasts_s[:place] + lasts_s[place + 1 :]
+            if others_s and lasts_s[place] < SHORT_SHARE * (usual_s := float(np.median(others_s))):
+                text = f"lasts {lasts_s[place]:.2f} s, the others {usual_s:.2f} s: was it cut off? Record it again"
+                yield Finding("short", text, trial.file, trial.line(len(trial.time_s) - 1), "time_s")
 
 
 def _missing_experiments(dataset: Dataset) -> Iterator[Finding]:
@@ -221,6 +228,7 @@ TRIAL_CHECKS: tuple[Callable[[Trial], Iterator[Finding]], ...] = (
 )
 DATASET_CHECKS: tuple[Callable[[Dataset], Iterator[Finding]], ...] = (
     _missing_repeats,
+    _short_repeats,
     _missing_experiments,
     _session_order,
     _lags,

@@ -1,5 +1,6 @@
 """`bifa instrument`: declare the format of an instrument's files, proposed from one of them and confirmed by you."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -117,6 +118,7 @@ def _ask_declaration(console: "Console", seen: "Look", role: str) -> dict[str, A
     columns: dict[str, str] = {}
     units: dict[str, str] = {}
     sign: dict[str, int] = {}
+    factor: dict[str, float] = {}
     more: dict[str, Any] = {}
     for name in [*wanted(role), *(["displacement_tail_mm"] if role == "camera" else [])]:
         proposed = given.columns.get(name) if given else None
@@ -129,7 +131,8 @@ def _ask_declaration(console: "Console", seen: "Look", role: str) -> dict[str, A
             continue
         columns[name] = column
         told = seen.unit(name, column.split(" + ")[0]) or (given.units.get(name) if given else None)
-        units[name] = _choice(f"What is the unit of {column!r}?", units_for(name), told)
+        units[name], scale = _unit(column, units_for(name), told, name == "time_s")
+        factor |= {} if scale == 1.0 else {name: scale}
         if name != "time_s" and typer.confirm(f"Reverse the sign of {name}?", default=False):
             sign[name] = -1
         more |= _clock(units[name], given) if name == "time_s" else {}
@@ -137,7 +140,8 @@ def _ask_declaration(console: "Console", seen: "Look", role: str) -> dict[str, A
     if not given or any(given.columns.get(n) != c or given.units.get(n) != units[n] for n, c in columns.items()):
         table |= {"columns": columns, "units": units}
     table |= {key: value for key, value in more.items() if not given or getattr(given, key) != value}
-    return table | ({"sign": sign} if sign else {}) | _sync(console, seen)
+    table |= {key: chosen for key, chosen in (("factor", factor), ("sign", sign)) if chosen}
+    return table | _sync(console, seen)
 
 
 def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -> str:
@@ -168,6 +172,20 @@ def _choice(question: str, allowed: list[str], proposed: str | None) -> str:
         if answer in allowed:
             return answer
         typer.echo(f"answer one of {', '.join(allowed)}")
+
+
+def _unit(column: str, allowed: list[str], told: str | None, is_time: bool) -> tuple[str, float]:
+    """Ask for a column's unit, or the factor by which a signal in another one, such as volts, comes in the first."""
+    from lacuna.decimals import number
+
+    other = "" if is_time else f"; or a number, how many {allowed[0]} one of the file's is"
+    while True:
+        answer = typer.prompt(f"What is the unit of {column!r}? ({', '.join(allowed)}{other})", default=told)
+        if answer in allowed:
+            return answer, 1.0
+        if other and 0.0 < abs(scale := number(answer) or 0.0) < math.inf:
+            return allowed[0], scale
+        typer.echo(f"answer one of {', '.join(allowed)}{other}")
 
 
 def _clock(unit: str, given: "Export | None") -> dict[str, Any]:

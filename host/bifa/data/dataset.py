@@ -18,7 +18,8 @@ class Trial:
 
     `columns` maps the name of a column, including its unit, to an array of shape (samples,), in the order of the
     file. `pressure_psi` and `rate_mm_s` are commanded values. `gait` is keyed as in a gait file. `extra`
-    holds the settings named in `layout.SETTINGS` and anything else that was noted during recording.
+    holds the settings named in `layout.SETTINGS` and anything else that was noted during recording. `lines`: those of
+    the file that the samples are on, if it is a declared export.
     """
 
     file: str
@@ -31,6 +32,11 @@ class Trial:
     repeat: int = 1
     session_order: int | None = None
     extra: dict[str, Any] = field(default_factory=dict)
+    lines: Sequence[int] = ()
+
+    def line(self, sample: int) -> int:
+        """Return the line of the file that a sample is on."""
+        return int(self.lines[sample]) if len(self.lines) else int(sample) + 2
 
     @property
     def time_s(self) -> np.ndarray:

@@ -15,6 +15,7 @@ a row of units, it has to agree.
 
 from __future__ import annotations
 
+import itertools
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -38,26 +39,38 @@ FRAME, DATE = "frame", "date"
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 _LENGTHS = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "in": 25.4, "um": 1e-3}
 _FORCES = {"N": 1.0, "kN": 1000.0, "mN": 1e-3, "lbf": 4.4482216152605, "kgf": 9.80665, "gf": 9.80665e-3}
-_PRESSURES = {"psi": 1.0, "kPa": 0.1450377377, "bar": 14.50377377, "mbar": 0.01450377377, "MPa": 145.0377377}
+_PASCALS = {"psi": 6894.757293168361, "Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "MPa": 1e6, "mbar": 100.0, "bar": 1e5}
+_PASCALS |= {"mmHg": 133.322387415, "inHg": 3386.388640341, "cmH2O": 98.0665}
+_PRESSURES = {unit: pascals / _PASCALS["psi"] for unit, pascals in _PASCALS.items()}
 UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": _SECONDS}  # by the suffix of a column's name
-_UNIT_ALIASES = {
-    "sec": "s",
-    "seconds": "s",
-    "second": "s",
-    "msec": "ms",
-    "µm": "um",
-    "inch": "in",
-    "lb": "lbf",
-    "volts": "v",
-    "lbs": "lbf",
+_KNOWN = {unit for sizes in UNITS.values() for unit in sizes}
+_SPELLINGS = {  # of units, as programs write them, in lower case
+    "s": "sec sec. secs second seconds",
+    "ms": "msec msecs millis millisecond milliseconds",
+    "us": "µs usec µsec microsecond microseconds",
+    "ns": "nsec nanosecond nanoseconds",
+    "min": "mins minute minutes",
+    "h": "hr hrs hour hours",
+    "m": "meter meters metre metres",
+    "mm": "millimeter millimeters millimetre millimetres",
+    "cm": "centimeter centimeters centimetre centimetres",
+    "um": "µm micron microns micrometer micrometers micrometre micrometres",
+    "in": "inch inches in.",
+    "N": "newton newtons",
+    "lbf": "lb lbs",
+    "psi": "psig",
+    "cmH2O": "cmh₂o",
 }
-_UNIT_ALIASES |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
+_UNIT_ALIASES = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings.split()}
 _ROWS = {"skip_rows": 0, "header_rows": 0, "units_rows": 0}  # and the minimum of each
 _CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ",")}
+_TEXTS = ("header", "units_above", "encoding", "sheet")
 _TABLES = ("columns", "units", "factor", "sign", "offset")  # keyed by the data set's columns
-_KEYS = ("preset", *_CHOICES, "separator", "encoding", *_ROWS, "header", "above", "sheet", *_TABLES, "where", "sync")
+_KEYS = ("preset", *_CHOICES, "separator", *_TEXTS, *_ROWS, "above", *_TABLES, "where", "sync")
 _KEYS += ("rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]")
+_FRACTION = re.compile("[.,]%f")  # in the form of a date
+_YEAR_OF_TIMES = 1900  # of dates that name none, by strptime
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
 _ROW_NUMBER = "[0]"  # in place of a column: the number of the row, from 0
@@ -162,6 +175,7 @@ def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.nda
     unit = export.units.get(name)
     if unit == DATE:
         moments = _moments(sheet, export, source, rows)
+        _refuse_midnight(sheet, moments, rows, source)
         return _seconds(moments, moments)
     if source == _ROW_NUMBER:
         values = rows.astype(float)
@@ -190,7 +204,7 @@ def _moments(sheet: Sheet, export: Export, source: str, rows: np.ndarray) -> lis
         try:
             moments.append(_moment(cell, export.date_format, zone))
         except ValueError:
-            form = f"of the form {export.date_format!r}" if export.date_format else "in ISO 8601 format"
+            form = f"of the form {export.date_format!r}" if export.date_format else "in ISO 8601 format (date_format)"
             raise sheet.error(f"{cell!r} is not a date {form}", row, source) from None
     return moments
 
@@ -200,11 +214,25 @@ def _seconds(moments: list[datetime], since: list[datetime]) -> np.ndarray:
     return np.array([(moment - since[0]).total_seconds() for moment in moments])
 
 
+def _refuse_midnight(sheet: Sheet, moments: list[datetime], rows: np.ndarray, source: str) -> None:
+    """Refuse times of day, which strptime puts in 1900, that begin again at 0."""
+    falls = [before > after for before, after in itertools.pairwise(moments)]
+    if any(falls) and moments[0].year <= _YEAR_OF_TIMES:
+        problem = 'time of day goes backwards: past midnight, the date is needed as well ("Date + Time")'
+        raise sheet.error(problem, rows[falls.index(True) + 1], source)
+
+
 def _moment(cell: str, form: str | None, zone: ZoneInfo | None) -> datetime:
     """Parse the date in a cell; raises ValueError if there is none. `form`: as for strptime, None for ISO 8601. `zone`:
     time zone of dates that name none; if None, they are taken as UTC, without daylight-saving changes."""
     text = cell.strip()
-    moment = datetime.fromisoformat(text) if form is None else datetime.strptime(text, form)
+    if form is None:
+        moment = datetime.fromisoformat(text)
+    else:
+        try:
+            moment = datetime.strptime(text, form)
+        except ValueError:  # whole seconds are often written without a fraction
+            moment = datetime.strptime(text, _FRACTION.sub("", form))
     return (moment if moment.tzinfo else moment.replace(tzinfo=zone or UTC)).astimezone(UTC)
 
 
@@ -235,10 +263,17 @@ def unit_in_file(sheet: Sheet, place: int) -> str | None:
 
 def unit_in(text: str) -> str | None:
     """Return the last unit that a text has in brackets or, without brackets, consists of; None if there is none."""
-    words = [word.strip() for word in _BRACKETS.findall(text) or [text]]
-    words = [_UNIT_ALIASES.get(word.lower(), word) for word in words]
-    known = {unit for sizes in UNITS.values() for unit in sizes}
-    return next((word for word in reversed(words) if word in known), None)
+    words = [_unit_called(word.strip()) for word in _BRACKETS.findall(text) or [text]]
+    return next(filter(None, reversed(words)), None)
+
+
+def _unit_called(word: str) -> str | None:
+    """The unit that a word means. Capitals may differ, as in "MM", but not in a single letter: "S" means much else."""
+    word = word.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
+    if word in _KNOWN:
+        return word
+    alike = {unit.lower(): unit for unit in _KNOWN if len(unit) > 1}
+    return (alike | _UNIT_ALIASES).get(word.lower())
 
 
 def _sizes(name: str) -> Mapping[str, float]:
@@ -270,6 +305,8 @@ def parse_export(fields: Fields, name: str) -> Export:
         threshold=threshold,
     )
     fields.finish(also=_KEYS)
+    if "%p" in (form := export.date_format or "") and "%I" not in form:
+        raise fields.error("date_format", "%p (AM or PM) counts only beside %I: write %I instead of %H")
     try:
         if export.zone:
             _zone(export.zone)
@@ -293,9 +330,10 @@ def _sync(fields: Fields) -> tuple[str, float]:
 
 
 def _form(fields: Fields) -> SheetForm:
-    how: dict[str, Any] = {key: fields.text(key) for key in ("header", "above", "encoding", "sheet") if key in fields}
+    how: dict[str, Any] = {key: fields.text(key) for key in _TEXTS if key in fields}
     how |= {key: fields.whole(key, least, 9999) for key, least in _ROWS.items() if key in fields}
     how |= {key: fields.choice(key, allowed) for key, allowed in _CHOICES.items() if key in fields}
+    how["above"] = _cells_above(fields) if "above" in fields else ()
     mark = fields.take("separator") if "separator" in fields else ","
     how["separator"] = SEPARATORS.get(str(mark), mark)
     if how["separator"] not in SEPARATORS.values():
@@ -309,6 +347,13 @@ def _form(fields: Fields) -> SheetForm:
     return SheetForm(**how)
 
 
+def _cells_above(fields: Fields) -> tuple[str, ...]:
+    cells = fields.take("above")
+    if not isinstance(cells, list) or not all(isinstance(cell, str) and cell.strip() for cell in cells):
+        raise fields.error("above", 'must be a list of cells as text, such as ["Length Units", "Meters"]')
+    return tuple(cell.strip() for cell in cells)
+
+
 def _check_columns(fields: Fields, export: Export) -> None:
     for key in _TABLES:
         for name, value in getattr(export, key).items():
@@ -319,6 +364,11 @@ def _check_columns(fields: Fields, export: Export) -> None:
         if not is_command(name) and name not in export.units and name not in export.factor:
             allowed = " | ".join(units_for(name))
             raise fields.error("units", f"{name} has no unit: declare its unit in the file ({allowed}), or a factor")
+    for layout in EXPERIMENTS.values():
+        names: dict[str, str] = {}
+        for name in filter(export.columns.__contains__, layout.all_columns):
+            if (other := names.setdefault(export.columns[name], name)) != name:
+                raise fields.error("columns", f"{other} and {name} are both {export.columns[name]!r}: only one can be")
 
 
 def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any) -> None:

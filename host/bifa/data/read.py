@@ -66,14 +66,15 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     heads = [_trial_head(fields) for fields in entries]
     paths = [_inside(folder, head, fields, exports) for head, fields in zip(heads, entries, strict=True)]
     _refuse_duplicates(heads, paths, entries)
-    trials = [Trial(**head, columns=_columns(file, head, exports)) for head, file in zip(heads, paths, strict=True)]
+    trials = [Trial(**head, **_samples(file, head, exports)) for head, file in zip(heads, paths, strict=True)]
     for trial, fields in zip(trials, entries, strict=True):
         _check_switches(trial, fields)
     return Dataset(folder, name, known, tuple(trials), provenance, exports)
 
 
-def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> dict[str, np.ndarray]:
-    """Columns of a file in the data set's own form, or in the form declared for the instrument of its experiment."""
+def _samples(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> dict[str, Any]:
+    """Columns of a file in the data set's own form, or in the form declared for the instrument of its experiment, and
+    then also the samples' lines."""
     layout = EXPERIMENTS[head["experiment"]]
     export = exports.get(ROLES[head["experiment"]], OWN_NAMES)
     sheet = Sheet(path, export.form, head["file"])
@@ -81,7 +82,7 @@ def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> di
         _check_header(sheet, layout)
     columns, rows = read_columns(sheet, export, layout.columns, layout.optional_columns)
     _check_values(columns, sheet, rows, export.columns)
-    return columns
+    return {"columns": columns} | ({"lines": [sheet.line(row) for row in rows]} if export is not OWN_NAMES else {})
 
 
 def _check_header(sheet: Sheet, layout: Layout) -> None:

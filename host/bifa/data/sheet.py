@@ -34,8 +34,9 @@ _PLACE = re.compile(r"(?:(.+) )?\[([1-9]\d*)\]", re.ASCII)  # "X [2]", the secon
 class SheetForm:
     """How a file is written. The column names are in `header_rows` rows after the first `skip_rows` or, if `header` is
     given, in the rows up to the line whose first cell is this text; below them follow `units_rows` rows that are not
-    data. Without rows of names, columns are known by their places, "[2]". `above`: a text that has to occur above the
-    names. `encoding` is Python's name for it; `sheet` is the name or the place of a workbook's sheet."""
+    data. Without rows of names, columns are known by their places, "[2]". `above`: cells that have to follow one
+    another above the names, empty ones aside; `units_above`: the first cell of the last line above them that has units.
+    `encoding` is Python's name for it; `sheet` is the name or the place of a workbook's sheet."""
 
     format: str = "csv"
     separator: str = ","
@@ -45,7 +46,8 @@ class SheetForm:
     header: str | None = None
     header_rows: int = 1
     units_rows: int = 0
-    above: str = ""
+    above: tuple[str, ...] = ()
+    units_above: str | None = None
     sheet: str | None = None
 
 
@@ -54,17 +56,19 @@ OWN = SheetForm()
 
 class Sheet:
     """A table as written in the file. `names`: the parts of each column's name, one per header row; `units`: each
-    column's cells in the rows of units; `first`: line of the first data row. Raises DatasetError if it is no table."""
+    column's cells in the lines of units; `first`: line of the first data row. Raises DatasetError if it is no table."""
 
     def __init__(self, path: Path, form: SheetForm = OWN, file: str | None = None) -> None:
         self._path, self._form, self.file = path, form, str(path) if file is None else file
         self._encoding = codecs.lookup(form.encoding).name.removesuffix("-sig")
-        heads, self._rows = self._workbook() if form.format == "xlsx" else self._text()
+        above, heads, self._rows = self._workbook() if form.format == "xlsx" else self._text()
         header, units = heads[: len(heads) - form.units_rows], heads[len(heads) - form.units_rows :]
+        if form.units_above is not None:
+            units = [*(cells for _, cells in self._labelled(form.units_above, above)[-1:]), *units]
         width = max([len(row) for row in heads], default=0)
         width = width if form.header_rows else max(width, self._first_width())
         self.names = [_parts(header, place) for place in range(width)]
-        self.units = [_parts(units, place) for place in range(width)]
+        self.units = [tuple(filter(None, (_cell(row, place) for row in units))) for place in range(width)]
         self._refuse_other_separator()
 
     # -- reading ---------------------------------------------------------------------------------------------------
@@ -75,7 +79,8 @@ class Sheet:
         except OSError as error:
             raise self._error(f"cannot be read ({error.strerror})") from None
 
-    def _text(self) -> tuple[list[list[str]], Any]:
+    def _text(self) -> tuple[list[str], list[list[str]], Any]:
+        """Lines above the names, cells of the names and of the units, and the rest."""
         raw = self._raw()
         if self._encoding.startswith(("utf-16", "utf-32")):
             raw, self._encoding = self._decoded(raw).encode(), "utf-8"
@@ -83,15 +88,16 @@ class Sheet:
             raw = raw.removeprefix(codecs.BOM_UTF8)  # spreadsheets write one
         if b"\r" in raw[:_HEAD] and b"\n" not in raw[:_HEAD]:
             raw = raw.replace(b"\r", b"\n")
-        lines = raw[:_HEAD].split(b"\n")
-        begin = self._first_head([line.decode(self._encoding, "replace") for line in lines])
+        lines = (raw if self._form.above else raw[:_HEAD]).split(b"\n")  # other tables may be above the one declared
+        texts = [line.decode(self._encoding, "replace") for line in lines]
+        begin = self._first_head(texts)
         count = self._form.header_rows + self._form.units_rows
         self.first = begin + count + 1
         heads = [
             self._cells(self._decoded(line), at + 1) for at, line in enumerate(lines[begin : begin + count], begin)
         ]
         offset = sum(len(line) + 1 for line in lines[: begin + count])
-        return heads, raw[offset:]
+        return texts[:begin], heads, raw[offset:]
 
     def _decoded(self, raw: bytes) -> str:
         encoding = self._encoding
@@ -109,35 +115,57 @@ class Sheet:
 
     def _first_head(self, lines: Sequence[str]) -> int:
         """Return the index of the first row of names."""
-        begin = self._form.skip_rows if self._form.header is None else self._first_named(self._form.header, lines)
-        if not any(self._form.above in line for line in ("", *lines[:begin])):
-            raise self._error(
-                f"no line above the column names contains {self._form.above!r}; if the export has other units or "
-                "another form than declared, declare these, and what is above the names (above)"
-            )
-        return begin
+        header, upper, begins = self._form.header, self._form.header_rows - 1, [self._form.skip_rows]
+        if header is not None:
+            lasts = (place for place, _ in self._labelled(header, lines) if place >= max(upper, self._form.skip_rows))
+            begins = [place - upper for place in lasts]
+        if not begins:
+            raise self._error(f"no line begins with {header!r}, the declared header of the column names{self._which}")
+        if not self._form.above:
+            return begins[0]
+        below = self._below(self._form.above, lines[: begins[-1]])
+        return next(begin for begin in begins if begin >= below)
 
-    def _first_named(self, header: str, lines: Sequence[str]) -> int:
-        for place, line in enumerate(lines):
-            cells = self._cells(line) if place >= self._form.skip_rows and header in line else []
-            if cells and cells[0].strip() == header and place + 1 >= self._form.header_rows:
-                return place - self._form.header_rows + 1
-        raise self._error(f"no line begins with {header!r}, the declared header of the column names")
+    def _labelled(self, label: str, lines: Sequence[str]) -> list[tuple[int, list[str]]]:
+        """Indices and cells of the lines whose first cell is `label`."""
+        split = [(place, self._cells(line)) for place, line in enumerate(lines) if label in line]
+        return [(place, cells) for place, cells in split if cells and cells[0].strip() == label]
+
+    def _below(self, wanted: Sequence[str], lines: Sequence[str]) -> int:
+        """Return the index of the line below the first cells that are those `wanted`, one after another."""
+        found = [(n, cell.strip()) for n, line in enumerate(lines) for cell in self._cells(line) if cell.strip()]
+        cells = [cell for _, cell in found]
+        for count in range(len(wanted), 0, -1):
+            ends = (end for end in range(count, len(cells) + 1) if cells[end - count : end] == [*wanted[:count]])
+            if (end := next(ends, None)) is None:
+                continue
+            if count == len(wanted):
+                return found[end - 1][0] + 1
+            then = _shown(cells[end]) if end < len(cells) else "nothing"
+            seen = f"{wanted[count - 1]!r} is followed by {then}, not {wanted[count]!r}"
+            break
+        else:
+            seen = f"no cell is {wanted[0]!r}; the cells there are {listed(cells) or 'none'}"
+        raise self._error(
+            f"above the column names, {seen}: if the export has another unit, rate or form than declared, declare "
+            "that, and what is above the names (above)"
+        )
 
     def _cells(self, line: str, number: int | None = None) -> list[str]:
         if self._form.separator == " ":
             return line.split()
         try:
-            return next(csv.reader([line.rstrip("\r")], delimiter=self._form.separator, skipinitialspace=True), [])
+            return next(csv.reader([line.strip("\r")], delimiter=self._form.separator, skipinitialspace=True), [])
         except csv.Error as error:
             raise self._error(f"cannot be read as a CSV: {error}", number) from None
 
-    def _workbook(self) -> tuple[list[list[str]], Any]:
+    def _workbook(self) -> tuple[list[str], list[list[str]], Any]:
         frame, rows = workbook(self._path, self._form.sheet, self.file)
-        begin = self._first_head([self._form.separator.join(row) for row in rows])
+        lines = [self._form.separator.join(row) for row in rows]
+        begin = self._first_head(lines)
         count = self._form.header_rows + self._form.units_rows
         self.first = begin + count + 1
-        return rows[begin : begin + count], frame.iloc[begin + count :].reset_index(drop=True)
+        return lines[:begin], rows[begin : begin + count], frame.iloc[begin + count :].reset_index(drop=True)
 
     def _first_width(self) -> int:
         """Number of columns in the first row of data."""
@@ -213,6 +241,11 @@ class Sheet:
                         self.first - 1,
                     )
 
+    @property
+    def _which(self) -> str:
+        undeclared = self._form.format == "xlsx" and self._form.sheet is None
+        return " (on the first sheet; another is declared by sheet)" if undeclared else ""
+
     def labels(self) -> list[str]:
         """Return the full name of each column, its parts joined by " / ", or its place if it has none, "[2]"."""
         return [" / ".join(parts) or f"[{place}]" for place, parts in enumerate(self.names, 1)]
@@ -226,7 +259,7 @@ class Sheet:
             named = [place for place, parts in enumerate(self.names) if bare is None or _is_called(parts, bare)]
             places = named[number - 1 : number]
         if not places:
-            raise self._error(f"lacks the column {name}; it has {listed(self.labels()) or 'none'}")
+            raise self._error(f"lacks the column {name}; it has {listed(self.labels()) or 'none'}{self._which}")
         if len(places) > 1:
             found = listed(self.labels()[place] for place in places)
             raise self._error(
@@ -268,7 +301,7 @@ class Sheet:
         if place >= self._frame.shape[1]:
             return [""] * len(self)
         if self._form.format == "xlsx":
-            return ["" if cell != cell or cell is None else str(cell) for cell in self._frame.iloc[:, place]]
+            return _marked(self._frame.iloc[:, place], self._form.decimal)
         written = map(self._written, range(len(self)))
         return [row[place] if place < len(row) else "" for row in written]
 
@@ -277,7 +310,8 @@ class Sheet:
         cell = cell.strip(BLANKS)
         found = number(cell if mark == "." else cell.replace(".", " ").replace(mark, "."))
         if found is None and cell:
-            raise self.error(f"{_shown(cell)} is not a number{self._hint(cell)}", row, name)
+            problem = f"{_shown(cell)} is not a number{self._hint(cell) or self._below_a_gap(row)}"
+            raise self.error(problem, row, name)
         return np.nan if found is None else found
 
     def _hint(self, cell: str) -> str:
@@ -301,11 +335,25 @@ class Sheet:
     def _refuse_beyond(self, row: int) -> None:
         width = len(self.names)
         cells = self._written(row) if self._form.format == "csv" else []
-        raise self.error(
-            f"{max(len(cells), width + 1)} fields, but {width} columns; are there commas in the numbers, or lines "
-            "above the column names? Save it with decimal points and without such lines, or declare how it is "
-            "written (bifa instrument)",
-            row,
+        beyond = next((f" ({_shown(cell)} is under none)" for cell in cells[width:] if cell.strip()), "")
+        cause = self._below_a_gap(row) or (
+            "; are there commas in the numbers, or lines above the column names? Save it with decimal points and "
+            "without such lines, or declare how it is written (bifa instrument)"
+        )
+        raise self.error(f"{max(len(cells), width + 1)} fields, but {width} columns{beyond}{cause}", row)
+
+    def _below_a_gap(self, row: int) -> str:
+        """What to do about a fault below an empty line, where another table may begin; "" if there is no such line."""
+        if self._form.format == "xlsx":
+            empty = self._rows.iloc[:row].isna().to_numpy().all(axis=1)
+        else:
+            empty = np.array([not line.strip(b'" \r' + self._form.separator.encode()) for line in self._lines[:row]])
+        if not empty.any():
+            return ""
+        line = self.line(int(np.argmax(empty)))
+        return (
+            f"; does another table begin below the empty line {line}? One table is read, the first or the one that "
+            "header and above name: remove what is below it"
         )
 
 
@@ -334,13 +382,24 @@ def _excel(path: Path, sheet: str | int | None, file: str) -> Any:
     import pandas
 
     try:
-        return pandas.read_excel(path, sheet_name=sheet, header=None, engine="openpyxl")
+        with pandas.ExcelFile(path, engine="openpyxl") as book:
+            names = book.sheet_names
+            if sheet is None or sheet in (*names, *range(len(names))):
+                return pandas.read_excel(book, sheet_name=sheet, header=None)
     except Exception as error:  # openpyxl's own, and zipfile's
         raise DatasetError(f"cannot be read as a workbook (.xlsx): {error}", file=file) from None
+    called = f"sheet {sheet + 1}" if isinstance(sheet, int) else f"sheet {sheet!r}"
+    raise DatasetError(f"lacks {called}; it has {listed(names)}", file=file)
 
 
 def _texts(frame: Any) -> list[list[str]]:
-    return [["" if value != value or value is None else str(value) for value in row] for row in frame.values]
+    return [_marked(row, ".") for row in frame.values]
+
+
+def _marked(values: Iterable[Any], decimal: str) -> list[str]:
+    """Cells of a workbook as text, numbers with this decimal sign."""
+    texts = ["" if value != value or value is None else value for value in values]
+    return [str(cell).replace(".", decimal) if isinstance(cell, float) else str(cell) for cell in texts]
 
 
 def listed(names: Iterable[str]) -> str:
@@ -354,7 +413,7 @@ def _parts(rows: Sequence[Sequence[str]], place: int) -> tuple[str, ...]:
     """Parts of a column's name, from top to bottom. Above the last row, a name that spans several columns (a marker's,
     over its X, Y and Z) is written in the first of them."""
     found = [_cell(row, place) or _spanning(row, place) for row in rows[:-1]] + [_cell(row, place) for row in rows[-1:]]
-    return tuple(part for part in found if part)
+    return tuple(filter(None, found))
 
 
 def _cell(row: Sequence[str], place: int) -> str:
@@ -362,9 +421,8 @@ def _cell(row: Sequence[str], place: int) -> str:
 
 
 def _spanning(row: Sequence[str], place: int) -> str:
-    """The nearest name to the left of an empty cell, in a row whose first column is empty."""
-    before = [cell.strip() for cell in row[:place] if cell.strip()]
-    return before[-1] if before and not _cell(row, 0) else ""
+    """The nearest name to the left of an empty cell. That of the first column (the time's, a title) spans no others."""
+    return next((cell.strip() for cell in reversed(row[1:place]) if cell.strip()), "")
 
 
 def _is_called(parts: Sequence[str], name: str) -> bool:

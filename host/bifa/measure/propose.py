@@ -35,6 +35,7 @@ _NAME_PATTERNS = {  # names that a column may have, in the languages of the pres
 }
 _DAY = r"\d{1,4}[-/.](\d{1,2}|[a-z]{3})[-/.]\d{1,4}"
 _CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?( ?[ap]m)?(Z|[+-]\d\d:?\d\d)?"
+_IN_BRACKETS = re.compile(r"\(.*\)|\[.*\]")
 _MOMENT = re.compile(rf"{_DAY}([T ]+{_CLOCK})?|{_CLOCK}", re.ASCII | re.IGNORECASE)
 
 
@@ -77,7 +78,12 @@ def look(path: Path) -> Look:
     """Inspect the file at `path`. Raises DatasetError if it does not contain a table."""
     how = _workbook(path) if path.suffix.lower() == ".xlsx" else _text(path)
     form = SheetForm(**{**how, "separator": SEPARATORS.get(how.get("separator", "comma"), ",")})
-    return Look(how, Sheet(path, form), {role: name for role in ("machine", "camera") if (name := _preset(path, role))})
+    presets = {role: name for role in ("machine", "camera") if (name := _preset(path, role))}
+    sheet = Sheet(path, form)
+    for role, name in presets.items():
+        by_preset = Sheet(path, parsed(role, {"preset": name}).form)
+        sheet = by_preset if by_preset.first != sheet.first else sheet  # the longest run of numbers is another table
+    return Look(how, sheet, presets)
 
 
 def declaration(role: str, table: Mapping[str, Any]) -> str:
@@ -221,7 +227,7 @@ def _heads(above: Sequence[Sequence[str]], width: int, by_blanks: bool = False) 
 def _is_of_units(row: Sequence[str]) -> bool:
     written = [cell.strip() for cell in row if cell.strip()]
     alone = [cell.strip("()[] ") for cell in written]  # "Time [s]" is a name
-    return sum(unit_in(unit) is not None for unit in alone) > len(written) / 2
+    return all(map(_IN_BRACKETS.fullmatch, written)) or sum(map(bool, map(unit_in, alone))) > len(written) / 2
 
 
 def _preset(path: Path, role: str) -> str | None:

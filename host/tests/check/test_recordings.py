@@ -123,6 +123,16 @@ def test_repeats_are_counted_whatever_their_numbers_are(numbers, said):
     assert [found.text.partition(";")[0] for found in findings if found.kind == "missing repeats"] == said
 
 
+def test_a_record_that_was_cut_off_is_shorter_than_the_other_repeats():
+    def cut(trial):
+        return replace(trial, columns={name: values[:25] for name, values in trial.columns.items()})
+
+    (found,) = check_recordings(mistaken(sound(), "locomotion_2.csv", cut))
+    assert str(found) == (
+        "locomotion_2.csv, line 26, time_s: lasts 0.24 s, the others 0.39 s: was it cut off? Record it again"
+    )
+
+
 def test_session_order_given_in_part_or_twice():
     dataset = sound()
     trials = [replace(t, session_order=[None, 4, 4][i % 3]) for i, t in enumerate(dataset.trials)]

@@ -13,6 +13,7 @@ import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bifa.check import check_dataset
 from bifa.data import DatasetError, read_dataset
 from bifa.data.export import dated_edges, parse_exports, presets, read_export, sync_edges, unit_in
 from bifa.data.fields import Fields, Source
@@ -206,11 +207,19 @@ def test_a_workbook_comes_in(tmp_path):
     table = pandas.DataFrame({"t": [0.0, 0.1], "x": [1.0, 2.0], "F": [3.0, 4.0]})
     table.to_excel(path, sheet_name="data", index=False, startrow=2)
     assert read_export(path, export, MACHINE)[0]["force_N"].tolist() == [3.0, 4.0]
-    second = declared(SIMPLE + 'format = "xlsx"\nsheet = "[2]"\n')
+    first, second = (declared(SIMPLE + f'format = "xlsx"\n{sheet}') for sheet in ("", 'sheet = "[2]"\n'))
     with pandas.ExcelWriter(path) as book:
         pandas.DataFrame({"of": ["specimen 1"]}).to_excel(book, sheet_name="results", index=False)
         table.to_excel(book, sheet_name="values of specimen 1", index=False)
     assert read_export(path, second, MACHINE)[0]["force_N"].tolist() == [3.0, 4.0]
+    with pytest.raises(DatasetError, match=r"lacks the column t; it has of \(on the first sheet; .* by sheet\)"):
+        read_export(path, first, MACHINE)
+    with pytest.raises(DatasetError, match=r"a\.xlsx: lacks sheet 'data'; it has results, values of specimen 1"):
+        read_export(path, export, MACHINE)
+    table["x"] = [1.0, "1,5"]
+    table.to_excel(path, sheet_name="data", index=False, startrow=2)
+    mixed = declared(SIMPLE + 'format = "xlsx"\nskip_rows = 2\nseparator = "semicolon"\ndecimal = ","\n')
+    assert read_export(path, mixed, MACHINE)[0]["displacement_mm"].tolist() == [1.0, 1.5]
     table["x"] = [1.0, "n.a."]
     table.to_excel(path, sheet_name="data", index=False, startrow=2)
     with pytest.raises(DatasetError, match=r"a\.xlsx, line 5, column x: 'n\.a\.' is not a number"):
@@ -246,7 +255,7 @@ def test_points_in_a_file_with_decimal_commas_are_no_thousands(tmp_path):
 
 
 def test_names_with_blanks_are_not_taken_for_more_columns(tmp_path):
-    text = SIMPLE.replace('"t"', '"Time"').replace('"x"', '"Disp"').replace('"F"', '"Time"') + 'separator = "space"\n'
+    text = SIMPLE.replace('"t"', '"Time"').replace('"x"', '"Disp"').replace('"F"', '"T"') + 'separator = "space"\n'
     with pytest.raises(DatasetError, match=r"line 2: 4 fields, but 6 names: blanks in the names\?.*\[2\]"):
         read(tmp_path, "Time (s) Disp (mm) F T\n0 1 10 20\n1 2 11 21\n", text)
 
@@ -279,6 +288,70 @@ def test_a_unit_is_seen_wherever_the_file_gives_it(tmp_path, head, more):
         read(tmp_path, head + "0,1,2\n1,2,3\n", SIMPLE.replace('"F"', f'"{name}"') + more)
 
 
+VICON = {
+    "Devices": "1000\n,,Kistler - Force,,\nFrame,Sub Frame,Fx,Fy,Fz\n,,N,N,N\n100,0,1,2,3\n100,1,1,2,3\n",
+    "Trajectories": "100\n,,robot:head,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n7,0,1.5,2,3\n8,0,1.25,2,3\n",
+}
+
+
+def test_of_several_tables_one_below_another_the_declared_one_is_read(tmp_path):
+    """Vicon Nexus writes one a kind of data, trajectories last, with an empty line between them."""
+    path, export = tmp_path / "a.csv", by_preset("vicon", "camera")
+    tables = [f"{name}\n{table}" for name, table in VICON.items()]
+    path.write_text("\n".join(tables))
+    found, _, _ = read_export(path, export, ("time_s", "displacement_mm"))
+    assert [values.tolist() for values in found.values()] == [[0.07, 0.08], [1.5, 1.25]]
+    assert look(path).sheet.has("robot:head / X")
+    path.write_text("\n".join(reversed(tables)))
+    with pytest.raises(DatasetError, match=r"line 9, column Frame: 'Devices' is not.* another table .* empty line 8\?"):
+        read_export(path, export, ("time_s", "displacement_mm"))
+
+
+@pytest.mark.parametrize(
+    ("below", "said"),
+    [
+        ("\nMax,2.5,3\n", r"line 5, column t: 'Max' is not a number; does another table .* below the empty line 4\?"),
+        (",,\nPeak\nn,t,x,F\n", r"line 6: 4 fields, but 3 columns \('F' is under none\); does another table begin"),
+        ("2,3,4,#* valve\n", r"line 4: 4 fields, but 3 columns \('#\* valve' is under none\); are there commas"),
+    ],
+)
+def test_what_ends_a_table_is_named(tmp_path, below, said):
+    with pytest.raises(DatasetError, match=said):
+        read(tmp_path, "t,x,F\n0,1,2\n1,2,3\n" + below)
+
+
+def test_a_name_over_several_columns_is_theirs_though_the_first_column_has_one_too(tmp_path):
+    """As a spreadsheet writes merged cells."""
+    text = SIMPLE.replace('"t"', '"Time"').replace('"x"', '"Head / y"').replace('"F"', '"Tail / y"')
+    text += "header_rows = 2\n"
+    found = read(tmp_path, "Time,Head,,Tail,\n,x,y,x,y\n0,1,2,3,4\n1,2,3,4,5\n", text)
+    assert [values.tolist() for values in found.values()] == [[0.0, 1.0], [2.0, 3.0], [4.0, 5.0]]
+
+
+def test_times_of_day(tmp_path):
+    """Whole seconds often lack the fraction; past midnight the date is needed."""
+    text = DATED + 'date_format = "%I:%M:%S.%f %p"\n'
+    found = read(tmp_path, "t,x,F\n11:59:58.5 AM,1,2\n11:59:59 AM,1,2\n12:00:00.25 PM,1,2\n", text)
+    assert found["time_s"].tolist() == [0.0, 0.5, 1.75]
+    with pytest.raises(DatasetError, match=r"line 3, column t: time of day goes backwards: past midnight, the date"):
+        read(tmp_path, "t,x,F\n11:59:59 PM,1,2\n12:00:00 AM,1,2\n", text)
+
+
+@pytest.mark.parametrize(
+    ("unit", "pascals"),
+    [
+        *(("psi", 6894.757293168361), ("Pa", 1.0), ("hPa", 100.0), ("kPa", 1e3), ("MPa", 1e6), ("mbar", 100.0)),
+        *(("bar", 1e5), ("mmHg", 133.322387415), ("inHg", 3386.388640341), ("cmH2O", 98.0665)),
+    ],
+)
+def test_pressures_come_in_by_their_unit(tmp_path, unit, pascals):
+    text = '[instrument.machine]\nunits_rows = 1\ncolumns = { pressure_psi = "p" }\n'
+    text += f'units = {{ pressure_psi = "{unit}" }}\n'
+    (tmp_path / "a.csv").write_text(f"p\n{unit}\n0\n2.5\n")
+    found, _, _ = read_export(tmp_path / "a.csv", declared(text), ("pressure_psi",))
+    np.testing.assert_allclose(found["pressure_psi"], [0.0, 2.5 * pascals / 6894.757293168361], rtol=1e-14)
+
+
 def test_without_times_rows_are_counted(tmp_path):
     declaration = SIMPLE.replace('time_s = "t"', 'time_s = "[0]"').replace('time_s = "s"', 'time_s = "frame"')
     found = read(tmp_path, "t,x,F\n,1,2\n,2,3\n,3,4\n", declaration + "rate_hz = 50\n")
@@ -289,13 +362,17 @@ def test_without_times_rows_are_counted(tmp_path):
     ("program", "stated", "other", "said", "declared_instead", "column", "factor"),
     [
         (
-            "vicon", b"\r\n100\r\n", b"\r\n250\r\n", "lacks the column 100 / Frame; it has 250 / Frame",
-            'rate_hz = 250\ncolumns = { time_s = "250 / Frame" }\n', "time_s", 0.4,
+            "vicon", b"\r\n100\r\n", b"\r\n250\r\n", "above .*, 'Trajectories' is followed by '250', not '100'",
+            'rate_hz = 250\nabove = ["Trajectories", "250"]\n', "time_s", 0.4,
         ),
         (
             "motive", b"Units,Meters", b"Units,Millimeters",
-            "no line above the column names contains 'Length Units,Meters'",
-            'above = "Length Units,Millimeters"\nunits = { displacement_mm = "mm" }\n', "displacement_mm", 1e-3,
+            "above .*, 'Length Units' is followed by 'Millimeters', not 'Meters'",
+            'above = ["Length Units", "Millimeters"]\nunits = { displacement_mm = "mm" }\n', "displacement_mm", 1e-3,
+        ),
+        (
+            "motive", b"Length Units,", b"Old Length Units,", "above .*, no cell is 'Length Units'; the cells there",
+            "above = []\n", "displacement_mm", 1.0,
         ),
     ],
 )  # fmt: skip
@@ -317,12 +394,16 @@ def test_an_export_that_states_another_rate_or_unit_than_its_preset_is_refused(
         (SIMPLE.replace('_N = "N"', '_N = "mm"'), r"line 3, .*units: force_N is 'mm'; it must be one of N, kN"),
         (SIMPLE.replace(', force_N = "N"', ""), r"units: force_N has no unit: declare its unit in the file.*N \| kN"),
         (SIMPLE + "skip_row = 2\n", r"line 4, .*skip_row: unknown key"),
+        (SIMPLE + 'above = "Length Units,Meters"\n', r"above: must be a list of cells as text, such"),
+        (SIMPLE + 'above = ["Trajectories", 100]\n', r"above: must be a list of cells as text"),
+        (SIMPLE + 'date_format = "%d/%m/%Y %H:%M:%S %p"\n', r"date_format: %p .* counts only beside %I"),
         (SIMPLE + "skip_rows = -2\n", r"skip_rows: -2 is outside"),
         (SIMPLE + 'preset = "bluehil"\n', r"preset: 'bluehil' is unknown; it must be one of arduino"),
         (SIMPLE + 'encoding = "latin1-de"\n', r"encoding: 'latin1-de' is unknown"),
         (SIMPLE + 'separator = "|"\n', r"separator: must be one of comma"),
         (SIMPLE + 'decimal = ","\n', r"decimal: must be"),
         (SIMPLE + "sign = { force_N = 2 }\n", r"sign: force_N must be 1 or -1"),
+        (SIMPLE.replace('"F"', '"x"'), r"line 2, .*columns: displacement_mm and force_N are both 'x': only one can be"),
         (SIMPLE + 'zone = "Berlin"\n', r"zone: unknown time zone 'Berlin'"),
         (SIMPLE + 'sync = "edges"\n', r"sync: must be"),
         (SIMPLE + 'sync = { column = "S", treshold = 1.0 }\n', r"sync\.treshold: unknown key.* column, threshold"),
@@ -344,6 +425,16 @@ def test_a_declaration_that_is_wrong_is_named_by_line_and_key(text, said):
     [
         *(("(mm)", "mm"), ("Load [kN]", "kN"), ("sec", "s"), ("Extension (inch)", "in"), ("Time", None)),
         *(("Time (s) Run #1", "s"), ("Load [N] (filtered)", "N"), ("Force", None), ("N / mm", None)),
+        *(("(µs)", "us"), ("(\N{GREEK SMALL LETTER MU}s)", "us"), ("usec", "us"), ("milliseconds", "ms")),
+        *(
+            ("micron", "um"),
+            ("Meter", "m"),
+            ("MM", "mm"),
+            ("(KPA)", "kPa"),
+            ("cmh2o", "cmH2O"),
+            ("Run (S)", None),
+            ("Secs", "s"),
+        ),
     ],
 )
 def test_units_are_recognized_where_they_are_written(text, unit):
@@ -396,6 +487,8 @@ DECLARED = """
 separator = "semicolon"
 decimal = ","
 header = "Zeit"
+above = ["Probe", "1"]
+units_above = "Einheit"
 units_rows = 1
 columns = { time_s = "Zeit", force_N = "Kraft" }
 units = { time_s = "s", force_N = "kN" }
@@ -459,6 +552,17 @@ def test_a_data_set_reads_exports_as_they_came(tmp_path):
             read_dataset(tmp_path)
 
 
+def test_a_finding_names_the_line_of_the_export(tmp_path):
+    (tmp_path / "raw").mkdir()
+    (tmp_path / "dataset.toml").write_text(TABLE + "[instrument.machine.where]\nStab = 1\n")
+    head = "\r\nWerkstoff;Silikon\r\nPrüfzeit;Standardweg;Standardkraft;Druck;Stab\r\ns;mm;N;kPa;\r\n"
+    numbers = [f"{n / 50};{n / 25};{n / 7:.3f};{-999 if n == 8 else n / 9:.3f}" for n in range(20)]
+    rows = [f"{row};{stab}" for row in numbers for stab in (2, 1)]
+    (tmp_path / "raw" / "one.TRA").write_text(head + "\r\n".join(rows).replace(".", ","), encoding="cp1252", newline="")
+    found = next(found for found in check_dataset(read_dataset(tmp_path)) if found.kind == "saturated")
+    assert (found.line, found.column) == (22, "pressure_psi")
+
+
 @pytest.mark.parametrize("page", ["campaign.md", "data-format.md"])
 def test_the_declarations_of_the_pages_are_valid(page):
     text = (Path(__file__).parents[3] / "docs" / page).read_text(encoding="utf-8")
@@ -467,6 +571,19 @@ def test_the_declarations_of_the_pages_are_valid(page):
     for block in blocks:
         source = Source(block, 0, page)
         assert parse_exports(Fields(parse_toml(block)["instrument"], source, table="instrument"), source)
+
+
+def test_units_in_a_line_above_the_names_have_to_agree(tmp_path):
+    record = {key: RECORD[key] for key in MACHINE}
+    path, export = written(tmp_path, "labview", record), by_preset("labview", "machine")
+    whole = path.read_bytes()
+    for unit in (b"Newtons", b"kN"):
+        path.write_bytes(whole.replace(b"X_Dimension", b"Y_Unit_Label\tmm\t" + unit + b"\r\nX_Dimension"))
+        if unit == b"kN":
+            with pytest.raises(DatasetError, match=r"Force: the file says kN, but units.force_N is declared as N"):
+                read_export(path, export, MACHINE)
+        else:
+            np.testing.assert_allclose(read_export(path, export, MACHINE)[0]["force_N"], record["force_N"], atol=1e-6)
 
 
 def test_a_columns_name_alone_is_no_unit(tmp_path):

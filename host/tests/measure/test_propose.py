@@ -70,6 +70,27 @@ def test_a_file_is_declared_by_answering_questions(tmp_path):
     np.testing.assert_allclose(found["force_N"], 1000.0 * MACHINE["force_N"], atol=0.06)
 
 
+def test_a_signal_in_volts_is_declared_by_its_factor(tmp_path):
+    path = tmp_path / "scope.csv"
+    path.write_text("Time,Channel A\n(us),(V)\n\n0,1.5\n10,0.25\n20,0.5\n")
+    said = asked(path, tmp_path, "", "", "Channel A", "V", "0", "2.5", "n", "-", "file", "y")
+    assert said.exit_code == 0, said.output
+    assert said.output.count("answer one of mm, m, cm, in, um; or a number, how many mm one of the file's is") == 2
+    found, _, _ = read_export(path, read_exports(tmp_path / "bench.toml")["machine"], ("time_s", "displacement_mm"))
+    np.testing.assert_allclose(found["time_s"], [0.0, 1e-5, 2e-5])
+    assert found["displacement_mm"].tolist() == [3.75, 0.625, 1.25]
+
+
+def test_the_table_of_a_preset_is_shown_though_another_is_longer(tmp_path):
+    path = tmp_path / "take.csv"
+    devices = "Devices\n1000\n,,Plate,,,,\nFrame,Sub Frame,Fx,Fy,Fz,Mx,My\n,,N,N,N,,\n" + "1,0,1,2,3,4,5\n" * 40
+    rows = "".join(f"{n},0,{n / 8},2,3\n" for n in range(20))
+    path.write_text(f"{devices}\nTrajectories\n100\n,,robot:head,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n{rows}")
+    said = asked(path, tmp_path, "y", "", "", "", "", "", "n", "", "", "n", "", "frames", "y", role="camera")
+    assert said.exit_code == 0, said.output
+    assert (tmp_path / "bench.toml").read_text() == '[instrument.camera]\npreset = "vicon"\nsync = "frames"\n'
+
+
 def test_a_preset_that_fits_is_offered_and_kept_short(tmp_path):
     path = exported(tmp_path, "testxpert", "machine")
     (tmp_path / "bench.toml").write_text("[known]\nhead_mass_kg = 0.18\n")
