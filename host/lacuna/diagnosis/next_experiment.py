@@ -66,6 +66,6 @@ def expected_gain(a: Channels, b: Channels, offer: CandidateExperiment, floor: N
     total, known = 0.0, {channel for _, channel in floor.channels}
     for channel in (c for c in a if c in known):
         noise = floor.of(offer.experiment, channel)
-        z = np.abs(a[channel] - b[channel]) / noise.sd
+        z = np.abs(a[channel] - b[channel]) / noise.sd_at(a[channel])
         total += 0.5 * float(np.nansum(np.minimum(z, 10.0) ** 2)) / noise.samples_per_piece
     return total

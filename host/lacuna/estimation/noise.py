@@ -1,9 +1,10 @@
 """The noise floor of a system's trials, estimated from repeats.
 
 The spread from run to run is often several times the sensor's noise, so a residual is structure only where it exceeds
-the differences between repeats of a condition. Two numbers per channel describe that spread: a standard deviation, and
-a timing jitter for records that jump (a snap-through 10 ms later is a huge residual but means nothing). A third number,
-the correlation length, says how many samples carry one independent piece of information.
+the differences between repeats of a condition. Three numbers per channel describe that spread: a standard deviation,
+the share of it that is proportional to the reading, and a timing jitter for records that jump (a snap-through 10 ms
+later is a huge residual but means nothing). A fourth, the correlation length, says how many samples carry one
+independent piece of information.
 """
 
 from __future__ import annotations
@@ -33,6 +34,9 @@ _WINDOW_S = 0.05
 _SAME_VALUE = 1e-9  # of a record's range: values closer than this are equal
 _MAX_DISTINCT_SHARE = 0.9  # distinct values per sample, at most, in a record whose values recur
 _GRID_REL_TOL = 1e-3  # of a rounding step: deviation from a multiple, at most
+_MEAN_DEVIATION = (2.0 / np.pi) ** 0.5  # mean absolute value of a standard normal variable
+_MIN_GROWTH_GAIN = 4.0  # log-likelihood for noise that grows with the reading: by chance in one record of 200
+_CONSTANT_SHARES = np.geomspace(1e-4, 1.0, 41)  # of the variance, that are tried; the last is noise that does not grow
 
 
 @dataclass(frozen=True)
@@ -41,13 +45,29 @@ class ChannelNoise:
 
     `sd` is the standard deviation in the channel's unit, `jitter_s` that of the timing of events, `samples_per_piece`
     the number of neighbouring samples that count as one independent observation. `repeats` is the number of pairs of
-    repeats that it was estimated from; 0: there are none.
+    repeats that it was estimated from; 0: there are none. `constant_share` is the share of the variance that does not
+    depend on the reading: 1 for most sensors; the rest grows with its square. Readings have an RMS of `reading`, at
+    which the standard deviation is `sd`.
     """
 
     sd: float
     jitter_s: float
     samples_per_piece: float
     repeats: int
+    constant_share: float = 1.0
+    reading: float = 1.0
+
+    @property
+    def grows(self) -> bool:
+        """Whether the noise grows with the reading."""
+        return self.constant_share < 1.0
+
+    def sd_at(self, readings: np.ndarray) -> np.ndarray:
+        """Standard deviation at each reading, without the jitter, shape as `readings`; `sd` where there is none."""
+        if not self.grows:
+            return np.full(np.shape(readings), self.sd)
+        squares = np.nan_to_num((readings / self.reading) ** 2, nan=1.0)
+        return self.sd * np.sqrt(self.constant_share + (1.0 - self.constant_share) * squares)
 
     @property
     def per_piece(self) -> float:
@@ -69,12 +89,11 @@ class NoiseFloor:
         return max(others, key=lambda noise: noise.per_piece)
 
     def sd(self, trial: Record, channel: str) -> np.ndarray:
-        """Standard deviation of each sample of a trial, shape (n,); larger where the record moves fast."""
-        noise = self.of(trial.experiment, channel)
-        if noise.jitter_s == 0:
-            return np.full(trial.time_s.shape, noise.sd)
-        samples = _smooth(trial.channels[channel])
-        return np.sqrt(noise.sd**2 + _shift_variance(trial.time_s, samples, noise.jitter_s, noise.sd))
+        """Standard deviation of each sample of a trial, shape (n,); larger where the record moves fast, and where the
+        reading is large if the noise grows with it."""
+        noise, samples = self.of(trial.experiment, channel), _smooth(trial.channels[channel])
+        sd = noise.sd_at(samples)
+        return np.sqrt(sd**2 + _shift_variance(trial.time_s, samples, noise.jitter_s, sd)) if noise.jitter_s else sd
 
     def lowered_by(self, other: NoiseFloor) -> NoiseFloor:
         """Return the lower of two floors for each channel. Both are upper bounds, since a model that does not fit adds
@@ -144,14 +163,49 @@ def _from_pairs(
     if still.sum() < 20:
         still = known
     sd = np.sqrt(np.mean(everything[still] ** 2))
-    sd = max(sd, sensor, _min_sd([trial for pair in pairs for trial in pair], channel))
+    least = max(sensor, _min_sd([trial for pair in pairs for trial in pair], channel))
     records = [(first.time_s, _smooth(first.channels[channel])) for first, _ in pairs]
-    jitter_s = _jitter(records, differences, moving, sd)
-    scaled = []
-    for record, difference in zip(records, differences, strict=True):
-        variance = sd**2 + (_shift_variance(*record, jitter_s, sd) if jitter_s else 0.0)
-        scaled.append(resample_evenly(record[0], difference / np.sqrt(variance)))
-    return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
+    constant = ChannelNoise(float(max(sd, least)), 0.0, 1.0, len(pairs))
+    growing = _growing(constant, np.concatenate([samples for _, samples in records])[known], everything[known], least)
+    noise, likelihood = _with_jitter(constant, records, differences, moving)
+    if growing.grows:
+        growing, likelier = _with_jitter(growing, records, differences, moving)
+        if likelier - likelihood > _MIN_GROWTH_GAIN * noise.samples_per_piece:
+            return growing
+    return noise
+
+
+def _growing(noise: ChannelNoise, readings: np.ndarray, differences: np.ndarray, least: float) -> ChannelNoise:
+    """Return `noise` with the constant share of the variance that is likeliest by the differences at `readings`, both
+    of shape (n,), and nowhere below `least`."""
+    reading = float(np.sqrt(np.nanmean(readings**2)))
+    if not reading > 0.0:
+        return noise
+    squares = np.nan_to_num((readings / reading) ** 2, nan=1.0)
+    shapes = np.sqrt(_CONSTANT_SHARES[:, None] + (1.0 - _CONSTANT_SHARES[:, None]) * squares)
+    means = np.maximum(np.mean(np.abs(differences) / shapes, axis=1), 1e-300)
+    best = int(np.argmin(np.log(means) + np.log(shapes).mean(axis=1)))
+    sd = max(float(np.sqrt(np.mean((differences / shapes[best]) ** 2))), least)
+    share = min(max(float(_CONSTANT_SHARES[best]), (least / sd) ** 2), 1.0)
+    return replace(noise, sd=sd, constant_share=share, reading=reading)
+
+
+def _with_jitter(
+    noise: ChannelNoise,
+    records: Sequence[tuple[np.ndarray, np.ndarray]],
+    differences: Sequence[np.ndarray],
+    moving: Sequence[np.ndarray],
+) -> tuple[ChannelNoise, float]:
+    """Return `noise` with the jitter and the correlation length that the differences then have, and the log-likelihood
+    of their absolute values (a Laplace distribution, so that outliers do not pass for jitter or growth)."""
+    sds = [noise.sd_at(samples) for _, samples in records]
+    jitter_s, scaled, likelihood = _jitter(records, differences, moving, sds), [], 0.0
+    for record, difference, sd in zip(records, differences, sds, strict=True):
+        total = np.sqrt(sd**2 + _shift_variance(*record, jitter_s, sd)) if jitter_s else sd
+        scaled.append(resample_evenly(record[0], difference / total))
+        known = np.isfinite(difference)
+        likelihood -= float(np.sum(np.log(total[known]) + np.abs(difference / total)[known] / _MEAN_DEVIATION))
+    return replace(noise, jitter_s=float(jitter_s), samples_per_piece=correlation_samples(scaled)), likelihood
 
 
 def _of_fast_noise(
@@ -209,17 +263,18 @@ def _jitter(
     records: Sequence[tuple[np.ndarray, np.ndarray]],
     differences: Sequence[np.ndarray],
     moving: Sequence[np.ndarray],
-    sd: float,
+    sds: Sequence[np.ndarray],
 ) -> float:
-    """Timing jitter whose mean square effect explains the differences of fast-moving samples beyond `sd`."""
-    excess = float(np.nansum([np.nansum(d[m] ** 2 - sd**2) for d, m in zip(differences, moving, strict=True)]))
+    """Timing jitter whose mean square effect explains the differences of fast-moving samples beyond `sds`."""
+    parts = zip(differences, moving, sds, strict=True)
+    excess = float(np.nansum([np.nansum(d[m] ** 2 - sd[m] ** 2) for d, m, sd in parts]))
     if excess <= 0 or not any(m.any() for m in moving):
         return 0.0
 
     def lacking(jitter_s: float) -> float:
         variances = (
             _shift_variance(time_s, samples, jitter_s, sd, m)
-            for (time_s, samples), m in zip(records, moving, strict=True)
+            for (time_s, samples), m, sd in zip(records, moving, sds, strict=True)
         )
         return float(excess - sum(np.nansum(variance) for variance in variances))
 
@@ -229,7 +284,7 @@ def _jitter(
 
 
 def _shift_variance(
-    time_s: np.ndarray, samples: np.ndarray, jitter_s: float, sd: float, where: np.ndarray | slice = slice(None)
+    time_s: np.ndarray, samples: np.ndarray, jitter_s: float, sd: np.ndarray, where: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
     """Mean square change of the samples `where` of a smooth record under a random shift in time, less the contribution
     of the record's own noise."""
@@ -240,7 +295,7 @@ def _shift_variance(
     total = np.zeros(before.shape)
     for node, weight in zip(_SHIFT_NODES, _SHIFT_WEIGHTS, strict=True):
         total += weight * (np.interp(then_s + node * jitter_s, rising_s, seen) - before) ** 2
-    return np.nan_to_num(np.maximum(total - sd**2, 0.0))
+    return np.nan_to_num(np.maximum(total - sd[where] ** 2, 0.0))
 
 
 def _smooth(samples: np.ndarray) -> np.ndarray:

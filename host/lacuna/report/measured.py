@@ -14,7 +14,8 @@ def measured_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
         conditions = len({t.condition for t in trials})
         basis = _pairs(noise.repeats) if noise.repeats else "the fast noise of the residual"
         piece = f"{noise.samples_per_piece:.3g}"
-        rows.append((f"{experiment}: {channel}", f"{len(trials)} in {conditions}", f"{noise.sd:.3g}", piece, basis))
+        sd = f"{noise.sd:.3g}" + (f" at {noise.reading:.3g}, and grows with the reading" if noise.grows else "")
+        rows.append((f"{experiment}: {channel}", f"{len(trials)} in {conditions}", sd, piece, basis))
     return rows
 
 

@@ -8,6 +8,8 @@ from heater import said_of
 import lacuna
 from lacuna import Effect, Parameter
 from lacuna.errors import MisuseError
+from lacuna.estimation.noise import estimate_noise
+from lacuna.run import with_records
 
 
 def spiked(column):
@@ -90,6 +92,59 @@ def test_a_model_that_counts_samples_is_pointed_out_where_repeats_have_other_tim
         records[name] |= {column: records[name][column][::2] for column in ("time_s", "power_W", "temperature_K")}
     verdict = lacuna.diagnose(heater.system(), records, progress=False)
     assert any("does the model count samples" in said for said in verdict.warnings) == other
+
+
+def response(seed, relative, saturates, unit=1.0):
+    """A dose-response table: three repeats of three series of doses."""
+    draw, records = np.random.default_rng(seed), {}
+    for series in (1.0, 1.5, 2.0):
+        dose = series * np.linspace(0.5, 50.0, 14)
+        for k in range(3):
+            y = 2.0 * dose / (1.0 + saturates * dose)
+            y = y * (1.0 + relative * draw.standard_normal(14)) + 0.05 * draw.standard_normal(14)
+            given = {"time_s": np.arange(14.0), "dose": dose, "y": unit * y, "condition": series}
+            records[f"{series}, run {k}"] = given
+    return records
+
+
+def dose_response(unit=1.0):
+    def simulate(record, theta):
+        dose = record["dose"]
+        return {"y": unit * (theta.slope * dose / (1.0 + theta.saturation.per_dose * dose) + theta.zero.offset)}
+
+    effects = [
+        Effect("saturation", Parameter("per_dose", "", 0.0, 0.0, 1.0, scale=0.01)),
+        Effect("zero", Parameter("offset", "", 0.0, -50.0, 50.0, scale=0.5)),
+    ]
+    return lacuna.System(simulate, Parameter("slope", "", 1.5, 0.1, 10.0), effects)
+
+
+@pytest.mark.parametrize("seed", [9, 10, 11])
+def test_noise_that_grows_with_the_reading_is_no_structure(seed):
+    found = lacuna.diagnose(dose_response(), response(seed, 0.05, 0.0), progress=False)
+    assert found.verdict == "none"
+    assert found.diagnosis.search.floor.channels["run", "y"].grows
+
+
+@pytest.mark.parametrize("relative", [0.0, 0.05])
+def test_an_effect_is_found_whether_or_not_noise_grows_with_the_reading(relative):
+    found = lacuna.diagnose(dose_response(), response(2, relative, 0.01), progress=False)
+    assert [e.name for e in found.effects] == ["saturation"]
+    assert found.effects[0].parameters["per_dose"] == pytest.approx(0.01, rel=0.2)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-14, 1e14])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_floor_tells_noise_that_grows_from_noise_that_does_not(seed, unit):
+    one, readings = dose_response(unit), unit * np.array([0.0, 10.0, 100.0])
+    for relative in (0.0, 0.05):
+        trials = with_records(one, response(seed, relative, 0.0, unit)).trials
+        noise = estimate_noise(one, trials).channels["run", "y"]
+        if not relative:
+            assert not noise.grows
+            continue
+        assert noise.sd_at(readings)[1:] / readings[1:] == pytest.approx(0.05, rel=0.2)
+        assert 0.0 < noise.sd_at(readings)[0] < 0.2 * unit
 
 
 @pytest.mark.parametrize(("bend", "verdict"), [(4e-4, "identified"), (0.0, "none")])
