@@ -389,9 +389,12 @@ class FunctionSystem(System):
 
 
 def _call_for_trial(what: str, trial: Record, ask: Callable[[], Any]) -> Any:
-    """Call a user's function for a trial. Raises MisuseError if it fails."""
+    """Call a user's function for a trial. Raises MisuseError if it fails, DeclarationError if what it declares is
+    wrong."""
     try:
         return ask()
+    except DeclarationError as error:
+        raise DeclarationError(f"trial {trial.name}, its {what}: {error}") from error
     except LacunaError:
         raise
     except Exception as error:

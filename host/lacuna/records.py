@@ -451,6 +451,11 @@ def windows(
     without it there are no repeats. Raises RecordError.
     """
     table = _one_long(data)
+    if functions := [name for name, column in table.columns.items() if callable(column)]:
+        raise RecordError(
+            f"record {table.name}, input {functions[0]}: a function does not follow the times of windows, which start"
+            " at 0. Give its samples at the record's times; if it is not one of time, let the model call it itself."
+        )
     time = table.time_s - table.time_s[0]
     sample = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
     every = seconds if every is None else every
@@ -475,7 +480,7 @@ def windows(
         name = _part(table, f"window {place + 1}")
         labels = {**table.labels, "condition": f"from {phase:g} s" if period else name, "order": place}
         columns = {n: c[at] if _along(c, table) else c for n, c in table.columns.items()}
-        found.append(Table(name, time[at] - time[at][0], columns, labels))
+        found.append(replace(table, name=name, time_s=time[at] - time[at][0], columns=columns, labels=labels))
     return found
 
 
@@ -494,7 +499,7 @@ def segments(data: Any, count: int = 10) -> list[Table]:
         name = _part(table, f"segment {place + 1}")
         labels = {**table.labels, "condition": name, "order": place, "stretch": (table, first, last)}
         columns = {n: c[first:last] if _along(c, table) else c for n, c in table.columns.items()}
-        found.append(Table(name, table.time_s[first:last], columns, labels))
+        found.append(replace(table, name=name, time_s=table.time_s[first:last], columns=columns, labels=labels))
     return found
 
 
@@ -504,7 +509,7 @@ def describe_reversal(time_s: np.ndarray) -> str:
     if not len(at):
         return ""
     before, after = time_s[at[0] : at[0] + 2]
-    return f"time does not increase from sample {at[0]} ({before:g} s) to the next ({after:g} s)"
+    return f"time does not increase from sample {at[0]} ({before:.12g} s) to the next ({after:.12g} s)"
 
 
 def _part(table: Table, name: str) -> str:

@@ -70,10 +70,10 @@ class Parameter:
                 raise DeclarationError(f"{self.name}: {what} is {given!r}, not a number")
         if not self.lower < self.upper:
             raise DeclarationError(f"{self.name}: lower {self.lower} is not below upper {self.upper}")
-        if not self.lower <= self.value <= self.upper:
-            raise DeclarationError(f"{self.name}: value {self.value} is outside {self.lower} to {self.upper}")
         if not _is_number(self.value):
             raise DeclarationError(f"{self.name}: value is {self.value}: fits begin there, so give a finite number")
+        if not self.lower <= self.value <= self.upper:
+            raise DeclarationError(f"{self.name}: value {self.value} is outside {self.lower} to {self.upper}")
         for what in ("scale", "prior_sd"):
             given = getattr(self, what)
             if given is not None and not (_is_number(given) and given > 0.0):

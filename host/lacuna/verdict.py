@@ -12,7 +12,7 @@ from typing import Any
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.named import Estimated
 from lacuna.diagnosis.record import as_record
-from lacuna.errors import MisuseError
+from lacuna.errors import LacunaError, MisuseError
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.structure import is_learnt
 from lacuna.function_system import FunctionSystem
@@ -25,14 +25,16 @@ class CompletedModel:
     """The completed model, called like `simulate`: `model(record)` or `model(record, theta)`.
 
     `record` is anything that `diagnose` accepts as one record. `theta` maps parameters to values that replace the
-    fitted ones, which are in `model.theta`. Nuisances have their expected values unless `theta` gives others. Returns
-    what `simulate` returns; for a segment of a longer record, only the segment's own samples. If the model is a
-    function, an unknown, fixed or tied parameter raises MisuseError.
+    fitted ones, which are in `model.theta`. Nuisances have their expected values unless `theta` gives others; if these
+    depend on an output that the record lacks, give them all. Returns what `simulate` returns; for a segment of a longer
+    record, only the segment's own samples. If the model is a function, an unknown, fixed or tied parameter raises
+    MisuseError.
     """
 
     def __init__(self, system: System, fitted: Fit):
         self._system, self._theta, self._effects = system, fitted.theta, fitted.structure.effects
         self._corrections = fitted.structure.corrections(fitted.theta)
+        self._nuisances = {p.name for each in map(system.nuisances, fitted.problem.trials) for p in each}
         names = [p.name for p in fitted.structure.parameters if not is_learnt(p.name)]
         self.theta = Values({name: system.told(name, fitted.theta[name]) for name in names})
         if isinstance(system, FunctionSystem):
@@ -42,11 +44,11 @@ class CompletedModel:
     def __call__(self, record: Any, theta: Mapping[str, float] | None = None) -> Any:
         system, given = self._system, dict(theta or {})
         record = _one(record, system.outputs) if isinstance(system, FunctionSystem) else record
-        fitted = self._theta | {p.name: p.value for p in system.nuisances(record)}
+        fitted = self._theta | self._expected(record, given)
         if not isinstance(system, FunctionSystem):
             return system.predict(fitted | given, self._effects, record, corrections=self._corrections)
         values = system.values(fitted, self._corrections)
-        if unknown := set(given) - set(values):
+        if unknown := set(given) - set(values) - self._nuisances:
             raise MisuseError(f"no parameter {', '.join(sorted(unknown))}; there are {', '.join(values)}.")
         if held := [name for name in given if name in system.held]:
             raise MisuseError(f"{held[0]} is fixed or tied, so it cannot be given: declare the system without that.")
@@ -56,6 +58,17 @@ class CompletedModel:
             return system.simulated(record, values)
         except KeyError as error:  # raised by the record or by the model itself
             raise MisuseError(f"the model finds no {error.args[0]}.") from error
+
+    def _expected(self, record: Any, given: Mapping[str, float]) -> dict[str, float]:
+        """The nuisances' expected values, which may depend on an output that a new record lacks; empty if all are
+        `given`."""
+        if self._nuisances <= given.keys():
+            return {}
+        try:
+            return {p.name: p.value for p in self._system.nuisances(record)}
+        except LacunaError as error:
+            values = ", ".join(f'"{name}": ...' for name in sorted(self._nuisances))
+            raise MisuseError(f"{str(error).rstrip('.')}. Give their values: model(record, {{{values}}}).") from error
 
     def __repr__(self) -> str:
         return f"Model({', '.join(f'{name}={value:.4g}' for name, value in self.theta.items())})"

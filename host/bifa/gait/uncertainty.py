@@ -199,9 +199,11 @@ class _LearntCurveDraws:
         for row in range(len(curve.values)):
             mine = {int(name.split(".")[1]): k for name, k in members.items() if name.split(".")[0] == str(row)}
             if mine:
-                knots = np.array(list(mine))
-                spline = CubicSpline(knots, np.eye(len(knots)), bc_type="natural")
-                self._rows.append((row, list(mine.values()), spline(np.arange(curve.values.shape[1])).T))
+                knots, places = zip(*sorted(mine.items()), strict=True)
+                each = np.ones((1, curve.values.shape[1]))  # a spline through one knot is constant
+                if len(knots) > 1:
+                    each = CubicSpline(knots, np.eye(len(knots)), bc_type="natural")(np.arange(each.shape[1])).T
+                self._rows.append((row, list(places), each))
 
     def at(self, off: np.ndarray) -> LearntCurve:
         values = self._curve.values.copy()

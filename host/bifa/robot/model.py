@@ -117,11 +117,11 @@ class Model:
         owner, *rest = name.split(".")
         try:
             if owner in STIFFNESS:
-                (power,) = map(int, rest)
+                (power,) = map(_place, rest)
                 return float(self.stiffness(owner).coefficients[power])
             if owner == LEARNT:
                 site, row, place = rest
-                return float(self.learnt[site].values[int(row), int(place)])
+                return float(self.learnt[site].values[_place(row), _place(place)])
             return self.effects[owner][".".join(rest)]
         except (KeyError, IndexError, ValueError):
             raise ModelParameterError(f"model {self.name!r} has no parameter {name!r}") from None
@@ -155,3 +155,10 @@ class Model:
         dropped if the set of effects changes."""
         kept = self.covariance
         return replace(self, effects=effects, covariance=kept if effects.keys() == self.effects.keys() else None)
+
+
+def _place(written: str) -> int:
+    """A place in a curve as a covariance writes it, in one way only: two names never mean the same value."""
+    if written != str(abs(int(written))):
+        raise ValueError(written)
+    return int(written)

@@ -27,8 +27,8 @@ def check_times(trials: Sequence[Record]) -> None:
             (a, b), (c, d) = ((float(t.time_s[0]), float(t.time_s[-1])) for t in (first, other))
             if min(b, d) - max(a, c) < 0.5 * min(b - a, d - c):
                 raise MisuseError(
-                    f"{_declared(first, other)}, but one spans {a:g} to {b:g} s and the other {c:g} to {d:g} s:"
-                    " count the times of each from its own start."
+                    f"{_declared(first, other)}, but one spans {a:.12g} to {b:.12g} s and the other {c:.12g} to"
+                    f" {d:.12g} s: count the times of each from its own start."
                 )
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from lacuna.diagnosis.decide import Choice
 from lacuna.diagnosis.nuisances import Followed, NuisanceOfRun, runs_of
 from lacuna.diagnosis.policy import Policy
@@ -19,13 +21,15 @@ from lacuna.estimation.uncertainty import Estimate, pieces_of, uncertainty
 _MIN_Z = 4.0  # standard deviations
 _MAX_REPEAT_RATIO = 3.0  # times the noise: residuals of repeats hardly differ by as much unless their predictions do
 _NEAR_LIMIT = 3.5  # standard deviations from its mean beyond which a nuisance probably absorbs model error
+_MAX_SPREAD = 2.0  # standard deviations of a nuisance between trials beyond which its declared one is doubted
 
 
 def not_predicted(found: Fit, split: Split, error: Error, floor: Floor, policy: Policy) -> list[str]:
     """For the verdict `none`: a warning if held-out records are predicted significantly worse than the noise."""
     pieces = sum(pieces_of(trial, found.problem.floor) for trial in split.final)
-    above = error.held_out**2 - floor.held_out**2 if split.final else 0.0
-    if above <= policy.relevance * floor.held_out**2 or above < _MIN_Z * floor.held_out**2 * (2.0 / pieces) ** 0.5:
+    noise = max(floor.held_out, 1.0)  # repeats may differ by less than the declared noise, or than rounding
+    above = (error.held_out**2 - floor.held_out**2) / noise**2 if split.final else 0.0
+    if above <= policy.relevance or above < _MIN_Z * (2.0 / pieces) ** 0.5:
         return []
     return [
         f"The test records ({listed([trial.name for trial in split.final])}) are predicted with an error of"
@@ -140,26 +144,41 @@ def _parameters(fitted: Fit) -> list[str]:
 
 
 def _far_nuisances(fits: list[Fit]) -> list[str]:
-    """Warnings for nuisances far from their expected value, in single trials or on average."""
+    """Warnings for nuisances far from their expected value, in single trials or on average, or more scattered than they
+    are declared to be."""
     runs: dict[str, list[NuisanceOfRun]] = {}
     for run in runs_of(fits):
         runs.setdefault(run.nuisance.name, []).append(run)
     found = []
     for name, each in runs.items():
-        if far := [one.trial.name for one in each if abs(one.away) > _NEAR_LIMIT]:
+        away, nuisance = np.array([one.away for one in each]), each[0].nuisance
+        spread = max(_spread(away), 1.0)
+        if spread > _MAX_SPREAD:
+            scale = spread * nuisance.step_scale
+            found.append(
+                f"{name} varies between trials with a standard deviation of about {_quantity(scale, nuisance.unit, 2)},"
+                f" where {_quantity(nuisance.step_scale, nuisance.unit)} is declared: what exceeds that counts as noise"
+                f" and may hide what is missing. Unless it is model error, declare it: scale={scale:.2g}."
+            )
+        elif far := [one.trial.name for one in each if abs(one.away) > _NEAR_LIMIT]:
             found.append(
                 f"{name} is more than {_NEAR_LIMIT:g} standard deviations from its expected value in {listed(far)}: it"
                 " probably absorbs model error."
             )
-        if abs(sum(one.away for one in each)) > _NEAR_LIMIT * len(each) ** 0.5:
+        if abs(away.sum()) > _NEAR_LIMIT * spread * len(each) ** 0.5:
             mean = sum(one.value for one in each) / len(each)
             expected = sum(one.nuisance.value for one in each) / len(each)
-            unit = each[0].nuisance.unit
             found.append(
-                f"{name} is {_quantity(mean, unit)} on average over {len(each)} trials, where"
-                f" {_quantity(expected, unit)} is expected: declare that average, or other runs are predicted worse."
+                f"{name} is {_quantity(mean, nuisance.unit)} on average over {len(each)} trials, where"
+                f" {_quantity(expected, nuisance.unit)} is expected: declare that average, or other runs are predicted"
+                " worse."
             )
     return found
+
+
+def _spread(away: np.ndarray) -> float:
+    """Standard deviation of `away`, robust against a few trials that are far from all others."""
+    return min(float(np.std(away)), 1.4826 * float(np.median(np.abs(away - np.median(away)))))
 
 
 def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
@@ -197,5 +216,5 @@ def _combined(names: list[str]) -> str:
     return listed(names) if len(names) == 1 else f"a combination of {listed(names)}"
 
 
-def _quantity(value: float, unit: str) -> str:
-    return f"{value:.4g} {unit}".rstrip()
+def _quantity(value: float, unit: str, digits: int = 4) -> str:
+    return f"{value:.{digits}g} {unit}".rstrip()

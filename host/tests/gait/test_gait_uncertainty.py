@@ -107,7 +107,28 @@ def test_learnt_curves_are_drawn_as_the_splines_that_they_were_fitted_as():
     assert np.ptp(emptying) == 0.0
 
 
-@pytest.mark.parametrize("name", ["body_stiffness.16", "body_stiffness.a", "learnt.filling.0.8", "neck_stiffness.0"])
+@pytest.mark.parametrize("places", [(0,), (64,), (64, 0), (16, 64, 0)])
+def test_any_knots_of_a_learnt_curve_are_drawn(places):
+    curve, names = LearntCurve(-14.5, 14.5, np.zeros((2, 65))), tuple(f"learnt.filling.0.{k}" for k in places)
+    model = replace(nominal(), learnt={"filling": curve}, covariance=Covariance(names, 0.04 * np.eye(len(places))))
+    filling = np.array([one.learnt[learnt.FILLING, 2:] for one in spread_of(model).naive.plants(model, 256, seed=3)])
+    assert [np.std(filling[:, 8 * k]) for k in places] == pytest.approx([0.2] * len(places), rel=0.1)
+    assert len(places) > 1 or np.ptp(filling, axis=1).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "body_stiffness.16",
+        "body_stiffness.a",
+        "body_stiffness.-1",
+        "learnt.filling.0.8",
+        "learnt.filling.0.-1",
+        "learnt.filling.0.01",
+        "neck_stiffness.0",
+    ],
+)
 def test_a_covariance_of_values_that_a_model_does_not_have_is_refused(name):
+    curve = LearntCurve(-14.5, 14.5, np.zeros((2, 3)))
     with pytest.raises(ModelParameterError, match=f"has no parameter '{name}'"):
-        replace(nominal(), covariance=Covariance((name,), np.eye(1)))
+        replace(nominal(), learnt={"filling": curve}, covariance=Covariance((name,), np.eye(1)))

@@ -328,11 +328,13 @@ def test_where_every_condition_is_spare_nothing_is_left_to_be_fitted():
         lacuna.diagnose(system, records, progress=False)
 
 
-def test_refuses_repeats_on_a_clock_of_the_day():
+@pytest.mark.parametrize("start_s", [0.0, 1.7e9])
+def test_refuses_repeats_on_a_clock_of_the_day(start_s):
     given = heater.records(2)
     for place, one in enumerate(given.values()):
-        one["time_s"] = one["time_s"] + 500.0 * place
-    with pytest.raises(MisuseError, match="from its own start"):
+        one["time_s"] = one["time_s"] + start_s + 500.0 * place
+    said = f"one spans {start_s:.10g} to .* s and the other {start_s + 500.0:.10g} to .* s: .* from its own start"
+    with pytest.raises(MisuseError, match=said):
         said_of(given)
 
 
@@ -532,6 +534,16 @@ def test_a_function_that_fails_is_told_with_its_record(which):
     system = heater.system(**{which: lambda record, *_: record["nope"]})
     with pytest.raises(MisuseError, match=f"steps_4W_1: its {which} raise KeyError: 'nope: record"):
         lacuna.diagnose(system, heater.records(2), progress=pytest.fail)
+
+
+def test_a_nuisance_that_starts_at_a_missing_sample_is_told_with_its_record():
+    def start(record):
+        return Parameter("start_K", "K", record["temperature_K"][0], -50.0, 50.0)
+
+    given = heater.records(2)
+    given["steps_4W_2"]["temperature_K"][0] = np.nan
+    with pytest.raises(DeclarationError, match="trial steps_4W_2, its nuisances: start_K: value is nan"):
+        lacuna.diagnose(heater.system(nuisances=start), given, progress=pytest.fail)
 
 
 def test_refuses_a_model_that_follows_what_was_measured():

@@ -129,3 +129,16 @@ def test_nuisances_that_are_all_a_little_off_are_pointed_out():
     found = lacuna.diagnose(system(), records(0, np.full(6, SPREAD_MM)), progress=False)
     (said,) = [one for one in found.warnings if one.startswith("zero_mm")]
     assert "on average over 24 trials, where 0 mm is expected" in said
+
+
+@pytest.mark.parametrize("declared_mm", [0.3, 0.1])
+def test_it_is_said_if_a_nuisance_varies_by_more_than_declared(declared_mm):
+    """The true spread is 0.3 mm: neither model error in some runs nor an average that differs from zero."""
+    found = lacuna.diagnose(system(declared_mm), records(5, np.zeros(6)), progress=False)
+    said = [one for one in found.warnings if one.startswith("zero_mm")]
+    if declared_mm == SPREAD_MM:
+        assert not said
+        return
+    (said,) = said
+    assert "where 0.1 mm is declared" in said
+    assert float(said.split("scale=")[1].rstrip(".")) == pytest.approx(SPREAD_MM, rel=0.4)

@@ -10,6 +10,7 @@ from toy import slow
 
 import lacuna
 from lacuna import Effect, Parameter
+from lacuna.errors import MisuseError
 from lacuna.misfit import compare_at_misfit
 from lacuna.records import RecordError
 from lacuna.run import with_records
@@ -82,9 +83,18 @@ def test_windows_begin_in_states_of_their_own():
 
     effects = (heater.OFFSET, heater.LIMITED, heater.DEAD, heater.SENSOR)
     system = lacuna.System(simulate, heater.PARAMETERS, effects, nuisances=start)
-    found = lacuna.diagnose(system, lacuna.windows(record(6, **LIMIT), 150.0), progress=False)
+    windows = lacuna.windows(record(6, **LIMIT), 150.0)
+    found = lacuna.diagnose(system, windows, progress=False)
     assert named(found) == {"saturation"}
     assert found.effects[0].parameters["limit_W"] == pytest.approx(8.0, rel=0.05)
+
+    coming = {"time_s": windows[0].time_s, "power_W": windows[0].columns["power_W"]}
+    predicted = found.model(coming, {"start_K": 2.0})["temperature_K"]
+    np.testing.assert_array_equal(predicted, found.model(windows[0], {"start_K": 2.0})["temperature_K"])
+    missing = {"temperature_K": np.full(len(windows[0].time_s), np.nan)}
+    for unmeasured, said in ((coming, "KeyError: .temperature_K"), (coming | missing, "start_K: lower nan")):
+        with pytest.raises(MisuseError, match=rf'{said}.*\. Give their values: model\(record, {{"start_K": ...}}\)'):
+            found.model(unmeasured)
 
 
 def test_slow_noise_without_an_effect_is_said_to_be_either():

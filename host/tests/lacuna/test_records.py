@@ -138,6 +138,18 @@ def test_every_column_of_an_input_is_cut(cut, samples):
     assert parts[3].columns["wind"][0].tolist() == [90.0, 91.0, 92.0]
 
 
+def test_a_function_of_time_is_not_cut_into_windows_whose_times_restart():
+    long = {"time_s": np.arange(100.0), "y": np.arange(100.0), "load_N": np.sin}
+    with pytest.raises(RecordError, match="record 1, input load_N: a function does not follow the times of windows"):
+        windows(long, 10.0)
+    assert segments(long, 10)[5].columns["load_N"] is np.sin
+
+
+@pytest.mark.parametrize("cut", [lambda one: windows(one, 10.0), lambda one: segments(one, 10)])
+def test_parts_of_a_record_keep_the_name_of_its_clock(cut):
+    assert {part.clock for part in cut({"t": np.arange(100.0), "y": np.arange(100.0)})} == {"t"}
+
+
 REFUSED_ARRAYS = {
     "a record of x, y has no times: .*for static data, the row number": {"x": [1.0, 2.0], "y": [1.0, 2.0]},
     r"times have the shape \(9, 1\).*squeeze_me": {

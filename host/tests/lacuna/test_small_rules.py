@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,11 @@ import pytest
 import lacuna
 from lacuna import Effect, Parameter
 from lacuna.diagnosis.next_experiment import expected_gain
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.residual_error import Error, Floor
 from lacuna.diagnosis.sizes import grown, sized, starts
 from lacuna.diagnosis.spectrum import peaks
+from lacuna.diagnosis.warn import not_predicted
 from lacuna.estimation.fit import fit
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
 from lacuna.estimation.problem import usable_cores
@@ -97,3 +101,13 @@ def test_a_range_far_wider_than_records_resolve_is_searched_coarsely():
     scaled = [{"y": np.sin(2.0 * np.pi * 0.3 * time_s)}]
     trials = [Record("1", "run", "c", time_s, scaled[0])]
     assert len(peaks(trials, scaled, 0.001, 1e5, 3)) <= 3
+
+
+@pytest.mark.parametrize(("error", "repeats", "said"), [(1.4, 1.0, True), (1.0, 1.0, False), (0.12, 0.01, False)])
+def test_only_errors_of_the_size_of_the_noise_are_worse_than_it(error, repeats, said):
+    """Repeats that differ by a hundredth of the declared noise do not make a tenth of it an error to warn of."""
+    final = (Record("a", "run", "a", np.arange(400.0), {"y": np.zeros(400)}),)
+    floor = NoiseFloor({("run", "y"): ChannelNoise(1.0, 0.0, 1.0, 3)})
+    found, split = SimpleNamespace(problem=SimpleNamespace(floor=floor)), SimpleNamespace(final=final)
+    warned = not_predicted(found, split, Error(1.0, error, error, {}), Floor(1.0, repeats, repeats), POLICY)
+    assert bool(warned) is said
