@@ -18,6 +18,7 @@ _LONGEST_BODY_M = 0.06
 # Share of the advance by which cycles may differ on a rippling supply or with a growing tether: such walks are never
 # periodic to a thousandth, but a gait that fails differs by more.
 _MAX_VARIATION = 0.2
+_SETTLED = 2e-3  # share of the advance by which successive cycles of a walk that has settled differ at most
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,8 @@ class Metric:
     while both ends slide. tolerance_m: of the integrator, per step. direction: -1 to count backward walking.
     inclination_deg: of the pipe, uphill positive. clock: seconds per second of the Uno, to which gaits and speeds
     refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies. unlike: every cycle
-    differs from the one before, so that no walk settles.
+    differs from the one before, so that no walk settles. settled: relative difference between the advances of two
+    successive cycles after which the others are not simulated; 0 to simulate all.
     """
 
     cycles: int = 10
@@ -56,6 +58,7 @@ class Metric:
     clock: float = 1.0
     dead_time_s: float = 0.0
     unlike: bool = False
+    settled: float = 0.0
 
     @property
     def is_plain(self) -> bool:
@@ -75,6 +78,11 @@ class Metric:
         """Return the metric with all the cycles of a measured walk, the second half judged, if walks never settle: with
         a tether a gait may fail as late as after sixteen cycles."""
         return replace(self, cycles=MAX_CYCLES, judged=MAX_CYCLES // 2) if self.unlike else self
+
+    def until_settled(self) -> "Metric":
+        """Return the metric for climbs over drawn robots, in which a walk ends once two cycles advance alike: of ten
+        cycles it takes four or five. A robot that falls does so earlier, while it gets going."""
+        return self if self.unlike else replace(self, settled=_SETTLED)
 
     def quicker(self) -> "Metric":
         """Return the metric for searches over many draws: six cycles, longer steps; the gaits it accepts are judged
@@ -117,11 +125,20 @@ class Passage:
         """The tunnel, 10 cm ahead of the head."""
         return terrain(tunnel())
 
+    @property
+    def settled(self) -> float:
+        """No walk ends early."""
+        return 0.0
+
     def finer(self) -> "Passage":
         """Return the metric for finalists: a smaller step."""
         return replace(self, tolerance_m=1e-6)
 
     def in_full(self) -> "Passage":
+        """Return the same metric: a tunnel is passed or not."""
+        return self
+
+    def until_settled(self) -> "Passage":
         """Return the same metric: a tunnel is passed or not."""
         return self
 

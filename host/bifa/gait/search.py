@@ -38,8 +38,7 @@ class RobustRound:
     draws: robots that each gait is evaluated on. quantile: of the speed, maximised. abandon: share of the best value
     below which a gait is abandoned. tolerance_m: of the integrator, per step. periods: relative changes of the period
     that the previous round's gaits are tried with. evaluations, step, climbs: budget, initial step and number of the
-    CMA-ES runs. in_full: walks have the metric's full number of cycles; the quick metric has too few for walks that
-    settle late. jitter: relative variation of the period from robot to robot.
+    CMA-ES runs. jitter: relative variation of the period from robot to robot.
     """
 
     draws: int
@@ -50,7 +49,6 @@ class RobustRound:
     evaluations: int = 0
     step: float = 0.0
     climbs: int = 1
-    in_full: bool = False
     jitter: float = 0.0
 
 
@@ -59,14 +57,11 @@ class RobustRound:
 EXPLORE = RobustRound(24, 0.08, 0.95, 1e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1400, 0.06, jitter=0.005)
 # At the cliff tiny changes of the period decide. Few robots favour periods that are too short, and so do integration
 # errors: with one gait 99 % of the robots walked at steps of 30 um, 65 % at 10 um, 34 % at 3 um, 27 % at 1 um and less.
-_REFINE = (
-    RobustRound(32, 0.0625, 0.95, 3e-6, (0.0, 0.02, 0.04), 480, 0.008, climbs=3, jitter=0.005),
-    RobustRound(128, 0.0677, 0.993, 3e-6, (0.0, 0.006, 0.012, -0.006), 192, 0.006, 2, in_full=True, jitter=0.002),
-)
+_REFINE = RobustRound(128, 0.0677, 0.993, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 288, 0.006, 3, jitter=0.002)
 # Changes, in s, of a gait's times that are tried between climbs: a climb ends at the first of many local optima.
 _LONGER_S: dict[str, tuple[float, ...]] = {name: (-0.1, -0.04, 0.04, 0.1) for name in TIMES}
 _LONGER_S |= {"body_vacuum": (-0.12, -0.06, -0.03, 0.03, 0.06), "body_pressure": (-0.02, 0.02, 0.05, 0.1)}
-_SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004), in_full=True)
+_SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004))
 # Finalists are checked by the full metric: the quick one is lenient, and a gait that is best on some robots may fail
 # on others. Copies slower by these fractions follow.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
@@ -171,8 +166,7 @@ class SearchRun:
         """Return the objective of a round, on robots of its own."""
         settings = self.settings
         draws = self.robots(stage.draws, settings.seed + 500_000 * number)
-        metric = settings.metric.in_full() if stage.in_full else settings.metric.quicker()
-        metric = replace(metric, tolerance_m=stage.tolerance_m)
+        metric = replace(settings.metric.in_full().until_settled(), tolerance_m=stage.tolerance_m)
         share = stage.quantile * settings.share / QUANTILE
         nominal, space = plant(self.model), settings.space
         return RobustSpeed(self.runs, nominal, draws, space, metric, share, stage.abandon, stage.jitter)
@@ -328,23 +322,18 @@ def _refine(search: SearchRun, objective: Objective, explored: Evaluated) -> Eva
 
 
 def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]:
-    """Run CMA-ES in rounds with more and more robots, each from the end points of the previous round, ranked again on
-    the new robots: the best on few robots may be so by chance."""
+    """Run CMA-ES on many robots from the best end points of the climbs on few, ranked again on the new robots: the best
+    on few robots may be so by chance. Returns nothing if none of these points walks on them."""
     settings, wraps = search.settings, search.settings.space.wraps
     ended = explored.finalists(_STARTS, BASIN_SPACING, wraps) if explored.ends is None else explored.ends.points
-    found = []
-    for number, stage in enumerate(_REFINE, start=1):
-        budget = _scaled_budget(stage.evaluations, settings)
-        progress_callback = search.progress_callback(f"refine {number}", budget)
-        recorder = RecordedObjective(search.objective(stage, number), wraps, progress_callback)
-        best = _tune_times(recorder, settings.space, ended, stage.periods)
-        begun = best.near_best(_MIN_END_RATIO).finalists(stage.climbs, BASIN_SPACING, wraps)
-        if not len(begun):
-            break
-        steps = [stage.step] * len(begun)
-        ended = climb_together(recorder, begun, budget, settings.seed, steps, stage.abandon).points
-        found.append(recorder.found())
-    return found
+    budget = _scaled_budget(_REFINE.evaluations, settings)
+    recorder = RecordedObjective(search.objective(_REFINE, 1), wraps, search.progress_callback("refine", budget))
+    best = _tune_times(recorder, settings.space, ended, _REFINE.periods)
+    begun = best.near_best(_MIN_END_RATIO).finalists(_REFINE.climbs, BASIN_SPACING, wraps)
+    if not len(begun):
+        return []
+    climb_together(recorder, begun, budget, settings.seed, [_REFINE.step] * len(begun), _REFINE.abandon)
+    return [recorder.found()]
 
 
 def _fastest_finalist(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:
@@ -371,7 +360,7 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
     the best of those that keep `_WALK_RATIO` is taken, and failing that, the one with the highest mean speed."""
     settings, space = search.settings, search.settings.space
     finalists = refined.finalists(_ROBUST_FINALISTS, apart=_MIN_SPACING)
-    objective = search.objective(_SHORTLIST, 3)
+    objective = search.objective(_SHORTLIST, 2)
     shortlist = np.concatenate(_at_periods(space, finalists, _SHORTLIST.periods))
     # One call each: gaits worse than the best so far are evaluated on few robots only, the hardest first.
     values = np.concatenate([objective(point[None]) for point in shortlist])

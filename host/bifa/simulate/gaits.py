@@ -52,11 +52,13 @@ def speeds(
     inclination_deg: float = 0.0,
     terrain: np.ndarray = rigs.CLEAR,
     dead_time_s: float = 0.0,
+    settled: float = 0.0,
     workers: int | None = None,
     executor: Executor | None = None,
 ) -> Advance:
     """Simulate gaits (n, 6), all with one model or each with its own of n models; arrays have shape (n, cycles).
-    `dead_time_s`: how long the Uno vents a chamber when switching between supplies.
+    `dead_time_s`: how long the Uno vents a chamber when switching between supplies. `settled`: if not 0, a walk ends
+    once a cycle's advance differs by less than this share from the one before, and the other cycles repeat it.
 
     Runs on `executor`, or else in `workers` threads (by default one per core) without the GIL. Rows are distributed in
     small pieces, since gaits differ in cost. Angles need not be within 0-360.
@@ -71,7 +73,7 @@ def speeds(
     shares = [piece for piece in np.array_split(np.arange(n), max(1, pieces)) if piece.size]
     if executor is None and len(shares) > 1:
         executor = _pool(count)
-    run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s)
+    run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s, settled)
     each: Callable[..., Any] = executor.map if executor else map
     found = each(run, [flats[piece[0] : piece[-1] + 1] for piece in shares], [gaits[piece] for piece in shares])
     advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
@@ -86,6 +88,7 @@ def _progress(
     inclination_deg: float,
     terrain: np.ndarray,
     dead_time_s: float,
+    settled: float,
     flats: Sequence[Plant],
     gaits: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -93,7 +96,7 @@ def _progress(
     ways = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
     ends = gaits[:, :1] * np.arange(1, cycles + 1)
     switches = gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)
-    what = lanes.Experiment(lanes.PROGRESS, ways, switches, list(ends), tolerance_m)
+    what = lanes.Experiment(lanes.PROGRESS, ways, switches, list(ends), tolerance_m, settled=settled)
     rows = np.array(lanes.march(flats, what, together=False))
     starts = np.array([flat.q[layout.BODY + layout.CONTRACTED] for flat in flats])
     return np.diff(rows[:, 0], prepend=starts[:, None]), np.diff(rows[:, 1], prepend=0.0)

@@ -1,11 +1,19 @@
 """The rules by which a speed counts: settled, periodic, no slip; and the passage of the tunnel."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bifa.gait.metric import Judged, Metric, Passage
-from bifa.simulate import Advance, speeds
+from bifa.gait.objectives import distribution
+from bifa.gait.uncertainty import spread_of
+from bifa.robot import nominal
+from bifa.robot.gait import Gait
+from bifa.simulate import Advance, gait_rows, speeds
 from bifa.simulate.terrain import passed_at_m, tunnel
+
+ROBUST = Gait(2.6729, 193.168, 325.634, 0.654, 0.4303, 0.4303)
 
 
 def progress(advance_mm, slip_um=0.0, period_s=2.0):
@@ -62,6 +70,18 @@ def test_what_never_settles_is_judged_in_full_by_the_second_half_of_what_is_walk
         assert metric.judge(falling).counted_mm_s == pytest.approx([23.0])
     assert Metric().in_full() == Metric()
     assert Metric().finer().cycles == 20
+    assert whole.until_settled() == whole
+
+
+def test_climbs_end_a_walk_once_it_has_settled_and_see_the_same_robots_fall(runs):
+    """The gait is at the cliff: some robots walk with it, others fall."""
+    gaits = gait_rows([replace(ROBUST, period_s=ROBUST.period_s * factor) for factor in (1.0, 0.98, 0.96)])
+    robots = spread_of(nominal()).plants(nominal(), 32, 0)
+    whole, ended = (distribution(runs, robots, gaits, one) for one in (Metric(), Metric().until_settled()))
+    falls = whole < 0.7 * whole.max()
+    assert 0.05 < falls.mean() < 0.95
+    np.testing.assert_array_equal(ended < 0.7 * whole.max(), falls)
+    np.testing.assert_allclose(np.median(ended[~falls] / whole[~falls]), 1.0, atol=3e-4)
 
 
 def test_passage_is_way_over_time_with_the_last_cycle_in_part():

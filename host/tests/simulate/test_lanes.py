@@ -155,6 +155,30 @@ def test_lanes_with_switches_and_samples_of_their_own(found):
         np.testing.assert_allclose(rows, lanes.in_numba(what, k, plants[k]), atol=1e-7)
 
 
+def test_a_walk_that_has_settled_is_extrapolated_and_one_that_has_not_is_simulated(found):
+    plants = _robots(None)
+    gaits = [replace(FAST, period_s=FAST.period_s * (1.0 - 0.02 * k)) for k in range(ROBOTS)]
+    times = [gait.period_s * np.arange(1, 13) for gait in gaits]
+    switches = [simulate.of_gait(gait, 13.0 * gait.period_s) for gait in gaits]
+    whole = lanes.Experiment(lanes.PROGRESS, [rigs.pipe(p) for p in plants], switches, times, TOLERANCE_M)
+    ended = []
+    for settled in (2e-3, 1e-12):
+        what = replace(whole, settled=settled)
+        got = found[0].march(plants, what, False)
+        for k, (rows, full) in enumerate(zip(got, found[0].march(plants, whole, False), strict=True)):
+            np.testing.assert_allclose(rows, lanes.in_numba(what, k, plants[k]), atol=1e-6)
+            same = int((rows == full).all(axis=0).sum())
+            ended.append(same)
+            cycles, expected = np.diff(rows[0]), np.diff(full[0])
+            if same < len(times[k]):
+                assert abs(cycles[same - 2] - cycles[same - 3]) <= settled * abs(cycles[same - 2])
+                assert np.ptp(cycles[same - 2 :]) < 1e-12
+            np.testing.assert_allclose(cycles, expected, atol=3.0 * settled * expected.max() + 1e-12)
+    assert min(ended) >= 3
+    assert np.mean(ended[:ROBOTS]) < 8.0
+    assert np.mean(ended[ROBOTS:]) > 10.0
+
+
 @pytest.mark.parametrize("lanes_of", [1, 2, 4, 8])
 def test_every_width_that_this_processor_has(lanes_of, found):
     if lanes_of > build.target().lanes:

@@ -121,5 +121,5 @@ def in_numba(what: Experiment, k: int, plant: Plant) -> np.ndarray:
         return entries.step_record(*place, commands.time_s, commands.command, *end).T
     if what.kind == ANCHOR:
         return entries.anchor_record(*place, what.extended_psi, what.rate_m_s, what.load_cell_N_m, *end).T
-    rows = entries.walk_record(*place, commands.time_s, commands.chamber, commands.command, *end).T
+    rows = entries.walk_record(*place, commands.time_s, commands.chamber, commands.command, *end, what.settled).T
     return rows if what.kind == WALK else rows[SEEN_OF_WALK if what.kind == SEEN else _PROGRESS_OF_WALK]

@@ -18,7 +18,7 @@ typedef struct {
 typedef struct {
     int64_t parts, free, wall, terrain_columns, curve_rows, learnt_terms, learnt_columns, experiment, together;
     const double *terrain;
-    double extended_psi, rate_m_s, load_cell_N_m, tolerance_m;
+    double extended_psi, rate_m_s, load_cell_N_m, tolerance_m, settled;
 } Setting;
 
 enum { WALK, SEEN, PROGRESS, STEP, ANCHOR };
@@ -162,6 +162,19 @@ static int begin(Bench *bench, const Setting *setting, const Job *job, int i) {
     return 1;
 }
 
+// If the last two cycles of a walk advanced alike, to within the share `settled`, extrapolate its progress to the other
+// samples.
+static void extrapolate(Schedule *s, double settled) {
+    const Job *job = s->job;
+    const double *head = job->rows + s->next_sample;
+    if (s->next_sample < 3 || !(fabs(head[-1] - 2.0 * head[-2] + head[-3]) <= settled * fabs(head[-1] - head[-2]))) return;
+    for (; s->next_sample < job->samples; s->next_sample++)
+        for (int c = 0; c < COLUMNS_OF[PROGRESS]; c++) {
+            double *out = job->rows + c * job->samples + s->next_sample;
+            *out = 2.0 * out[-1] - out[-2];
+        }
+}
+
 static void sample(Bench *bench, const Setting *setting, Mask m) {
     V row[MOST_COLUMNS];
     Plant *plant = &bench->plant;
@@ -181,6 +194,7 @@ static void sample(Bench *bench, const Setting *setting, Mask m) {
         double *out = s->job->rows + s->next_sample;
         for (int c = 0; c < columns; c++) out[c * s->job->samples] = at_lane(row[c], i);
         s->next_sample++;
+        if (setting->settled > 0.0) extrapolate(s, setting->settled);
     }
 }
 

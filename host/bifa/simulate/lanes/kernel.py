@@ -43,13 +43,17 @@ class _Setting(ctypes.Structure):
             )
         ),
         ("terrain", ctypes.c_void_p),
-        *((name, ctypes.c_double) for name in ("extended_psi", "rate_m_s", "load_cell_N_m", "tolerance_m")),
+        *((name, ctypes.c_double) for name in ("extended_psi", "rate_m_s", "load_cell_N_m", "tolerance_m", "settled")),
     ]
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment on several robots: mounting, switches and sample times of each, and the settings common to all."""
+    """An experiment on several robots: mounting, switches and sample times of each, and the settings common to all.
+
+    settled: share of the advance by which successive cycles of a `PROGRESS` may differ for the rest to be extrapolated;
+    0 to simulate all.
+    """
 
     kind: int
     rigs: Sequence[Mounting]
@@ -59,6 +63,7 @@ class Experiment:
     extended_psi: float = 0.0
     rate_m_s: float = 0.0
     load_cell_N_m: float = 0.0
+    settled: float = 0.0
 
 
 class Kernel:
@@ -81,6 +86,7 @@ class Kernel:
         setting.experiment, setting.together, setting.tolerance_m = what.kind, together, what.tolerance_m
         setting.extended_psi = what.extended_psi
         setting.rate_m_s, setting.load_cell_N_m = what.rate_m_s, what.load_cell_N_m
+        setting.settled = what.settled
         jobs["switch_s"] = _addresses([one.time_s for one in what.switches])
         jobs["chamber"] = _addresses([one.chamber for one in what.switches])
         jobs["command"] = _addresses([one.command for one in what.switches])
