@@ -78,6 +78,12 @@ class Case:
         other._answers = {key: found for key, found in self._answers.items() if key[0] in _FITS}
         return other
 
+    @property
+    def has_factors(self) -> bool:
+        """Whether nuisances are factors of parameters. Their scatter belongs in the floor, since a run has to be
+        predicted without knowing its factors (`predictive`)."""
+        return any(p.factor_of for trial in self.split.known for p in self.system.nuisances(trial))
+
     def fit_base(self, starts: int) -> Fit:
         """Fit the base model to the trials to fit, with a noise floor from the differences between repeats' residuals
         in all trials but the final ones."""
@@ -99,9 +105,8 @@ class Case:
         """Refit against the floor that the explanation's own residuals show, as long as the floor falls and the
         explanation suffices. Nuisances such as a run's initial state may scatter by more than the noise. The first
         floor, estimated with nuisances at their expected values, contains all of that scatter and the next one still
-        some of it, which would hide structure. Nothing is done if any nuisance is a factor of parameters: that scatter
-        belongs in the floor, since a run has to be predicted without knowing its factors (`predictive`)."""
-        if any(p.factor_of for parameters in candidate.fitted.problem.nuisances for p in parameters):
+        some of it, which would hide structure. The scatter of factors stays in the floor."""
+        if self.has_factors:
             return candidate
         for _ in range(MAX_REESTIMATES):
             floor = candidate.fitted.problem.floor

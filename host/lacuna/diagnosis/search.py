@@ -14,7 +14,7 @@ from lacuna.diagnosis.score import Promise, Scores, Screened, score
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import reweigh, starting_point
-from lacuna.estimation.noise import REFIT_SHARE, NoiseFloor
+from lacuna.estimation.noise import MAX_REESTIMATES, REFIT_SHARE, NoiseFloor
 from lacuna.estimation.solve import cost_of
 from lacuna.system import Effect
 
@@ -86,8 +86,10 @@ def search(
         ranked = _ranked(tried, size)
         if not ranked:
             break
-        lower = sharpened_floor(ranked[0], split, floor)
-        if lower.share_of(floor) < REFIT_SHARE:
+        for _ in range(1 if case.has_factors else MAX_REESTIMATES):
+            lower = sharpened_floor(ranked[0], split, floor)
+            if lower.share_of(floor) >= REFIT_SHARE:
+                break
             workers.on_progress("weighing again against a lower floor")
             floor = lower
             tried = _reweigh_all(tried, size, split, lower, case.policy.reach)

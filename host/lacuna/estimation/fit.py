@@ -23,7 +23,7 @@ _UNDETERMINED_SD = 0.1  # scales: tolerance of a bound for a parameter that the 
 _MIN_REL_GAIN = 1e-3  # of the cost: a search that gains less is not followed by another
 _CONVERGED = 4e-3  # the same for a reported RMS error, which is then known to a fifth of a per cent
 _CONVERGED_ITERATIONS, _ROUNDS = 20, 5
-_NUISANCE_ITERATIONS = 4
+_NUISANCE_ITERATIONS = 20  # of a record's own nuisances, which are few: their derivatives cost little
 _NO_NUISANCES = np.zeros(0)
 
 
@@ -127,7 +127,8 @@ def refit_on(
     problem = fitted.problem.over(trials)
     known = {name: nuisances for one in near for name, nuisances in _by_name(one).items()}
     start = Point(fitted.solution.point.values, tuple(known[t.name] for t in trials))
-    solution = solve(problem, start, max_iterations=max_iterations, relative=relative)
+    options: dict[str, Any] = {"max_iterations": max_iterations, "relative": relative}
+    solution = continue_search(problem, solve(problem, start, **options), restart_nuisances=False, **options)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
@@ -143,15 +144,21 @@ def converged(fitted: Fit) -> Fit:
 
 
 def continue_search(
-    problem: Problem, solution: Solution, *, min_gain: float = _MIN_REL_GAIN, **options: Any
+    problem: Problem,
+    solution: Solution,
+    *,
+    min_gain: float = _MIN_REL_GAIN,
+    restart_nuisances: bool = True,
+    **options: Any,
 ) -> Solution:
     """Continue from `solution` with further searches for as long as one gains the share `min_gain` of the cost.
 
-    Each round searches on with the nuisances as they are and, while that helps, also with the nuisances restarted at
-    their means. If the model predicts a jump slightly early or late, a nuisance and a parameter of similar effect (a
-    run's friction and the friction) hold each other in place until a search releases one of them.
+    Each round searches on with the nuisances as they are, unless that has converged, and (`restart_nuisances`) while
+    that helps, also with the nuisances restarted at their means. If the model predicts a jump slightly early or late, a
+    nuisance and a parameter of similar effect (a run's friction and the friction) hold each other in place until a
+    search releases one of them.
     """
-    restart_nuisances = any(problem.nuisances)
+    restart_nuisances = restart_nuisances and any(problem.nuisances)
     for _ in range(_ROUNDS):
         further = [] if solution.converged else [solve(problem, solution.point, **options)]
         if restart_nuisances:

@@ -97,7 +97,7 @@ def solve(
                 sensitivities, age = _corrected(sensitivities, before, here, scale, len(free)), age + 1
                 continue
             if enough and (age == 0 or kept > _CONVERGED_GAIN_RATIO):
-                converged = True
+                converged = kept > _MIN_GAIN_RATIO  # otherwise the step was small because the prediction failed
                 break
         elif age == 0:
             converged = negligible
@@ -142,7 +142,7 @@ def _descend(
 ) -> tuple[_State | None, float, float, bool]:
     """Find a step from `here` that lowers the cost, increasing the damping after every failure (`once`: a single try,
     for old derivatives). Returns the new place or None, the ratio of actual to predicted gain, the damping for the next
-    step, and whether the predicted gain of the last step tried was too small to be worth taking."""
+    step, and whether even a step without damping promises too little to be worth taking."""
     system = _linearize(problem, here, free, sensitivities)
     lower, upper, scale = _limits(problem, here.point, free)
     reach = _MAX_STEP_SCALES * scale
@@ -161,7 +161,8 @@ def _descend(
         damping, growth = max(damping, 1e-6) * growth, 2.0 * growth
         if once:
             break
-    return None, 0.0, damping, predicted_gain < least
+    negligible = predicted_gain < least and _step(*system, here.x, *bounds, scale, 0.0)[1] < least
+    return None, 0.0, damping, negligible
 
 
 def _corrected(
