@@ -5,7 +5,8 @@ cd "$(dirname "$0")/.."
 
 suits() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; }
 
-if ! suits .venv/bin/python; then
+# An interrupted `python -m venv` leaves an environment without pip.
+if ! suits .venv/bin/python || ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
     for python in "${PYTHON:-python3}" python3.14 python3.13 python3.12 python3.11 none; do
         suits "$python" && break
     done

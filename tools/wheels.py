@@ -29,6 +29,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", choices=PACKAGES, action="append", help="build only this package; may be repeated")
     parser.add_argument("--without-image", action="store_true", help="build bifa without firmware: it cannot flash")
     given = parser.parse_args(arguments)
+    if not (ROOT / ".git").exists():
+        parser.error("git lists the files to pack, and this is no clone: `pip wheel ./host/lacuna ./host` needs no git")
     image = None if given.without_image else IMAGE
     if image and not image.is_file():
         parser.error(f"no {image.relative_to(ROOT)}: run `pio run -e uno`, or leave it out with --without-image")

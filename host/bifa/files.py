@@ -42,6 +42,7 @@ def check_targets(
         parent = path.resolve().parent
         if path.is_dir():
             raise TargetError(f"{path} is a folder; name a file in it")
+        _refuse_irregular(path)
         if not parent.is_dir():
             raise TargetError(f"the folder {parent} does not exist; create it first")
         if path.resolve() in read:
@@ -66,6 +67,12 @@ def _refuse_same(files: list[Path], folders: list[Path]) -> None:
     for path in folders:
         if path.resolve() in taken:
             raise TargetError(f"{path} is used for both a file and a folder; choose different paths")
+
+
+def _refuse_irregular(path: Path) -> None:
+    """Refuse a pipe or a device, which would be replaced by a file: for root, even /dev/null."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise TargetError(f"{path} is a pipe or a device, not a regular file; write to a file first")
 
 
 def _check_writable(folder: Path, asked: Path) -> None:
@@ -105,6 +112,7 @@ def written(path: str | os.PathLike[str]) -> Iterator[Path]:
     the block becomes a TargetError.
     """
     target = Path(path)
+    _refuse_irregular(target)
     aside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
     try:
         yield aside

@@ -6,6 +6,7 @@ by a killed program is stale and taken over.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shlex
@@ -19,6 +20,7 @@ from typing import IO
 
 from bifa.errors import BifaError
 
+_TAKEN = (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)  # the last two on Windows
 _LOCK_POSITION = 1 << 30  # position of the byte locked on Windows, beyond the text, since locked bytes cannot be read
 
 
@@ -50,9 +52,12 @@ def _acquire(path: Path, folder: Path) -> IO[str]:
     while True:
         try:
             file = path.open("a+", encoding="utf-8")
+            is_held = _hold(file)
         except OSError as error:
-            raise LockedError(f"{path} cannot be written ({error.strerror or error}); choose another folder") from None
-        if not _hold(file):
+            raise LockedError(
+                f"{path} cannot be written and locked ({error.strerror or error}); choose another folder"
+            ) from None
+        if not is_held:
             file.seek(0)
             text = file.read()
             file.close()
@@ -66,10 +71,14 @@ def _acquire(path: Path, folder: Path) -> IO[str]:
 
 
 def _hold(file: IO[str]) -> bool:
-    """Try to lock `file`; returns whether that succeeded."""
+    """Try to lock `file`; returns whether that succeeded. Raises OSError where nothing can be locked, as on some
+    network drives."""
     try:
         _lock(file)
-    except OSError:
+    except OSError as error:
+        if error.errno not in _TAKEN:
+            file.close()
+            raise
         return False
     return True
 

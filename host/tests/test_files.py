@@ -1,6 +1,7 @@
 """Files are written whole or not at all, and output paths are checked before any work."""
 
 import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,20 @@ def test_targets_are_refused_before_work(tmp_path):
         check_targets(tmp_path)
     with pytest.raises(TargetError, match="is a file, so "):
         check_targets(folders=(tmp_path / "file" / "pictures",))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@pytest.mark.parametrize("is_link", [False, True])
+def test_a_pipe_or_a_device_is_not_replaced_by_a_file(tmp_path, is_link):
+    os.mkfifo(target := tmp_path / "pipe")
+    if is_link:  # as /dev/stdout is
+        (tmp_path / "link").symlink_to(target)
+        target = tmp_path / "link"
+    with pytest.raises(TargetError, match="a pipe or a device"):
+        check_targets(target)
+    with pytest.raises(TargetError, match="a pipe or a device"):
+        write_text(target, "model\n")
+    assert target.is_fifo()
 
 
 def test_what_a_command_reads_and_what_was_measured_are_never_its_target(tmp_path):

@@ -1,5 +1,6 @@
 """Only one program at a time works in a folder, and the others are told which."""
 
+import errno
 import json
 import os
 import signal
@@ -77,4 +78,13 @@ def test_a_lock_that_says_nothing_is_taken_over(tmp_path, left):
     folder = tmp_path / "campaign"
     lock_of(folder).write_text(left)
     with locked(folder):
+        pass
+
+
+def test_where_nothing_can_be_locked_nobody_is_blamed(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(pytest.importorskip("fcntl"), "flock", refuse)
+    with pytest.raises(LockedError, match=r"locked \(No locks available\); choose another"), locked(tmp_path / "day"):
         pass

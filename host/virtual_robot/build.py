@@ -39,6 +39,11 @@ class Part:
         return HERE / self.name / f"_{self.leaf}{sysconfig.get_config_var('EXT_SUFFIX')}"
 
     @property
+    def needs(self) -> str:
+        packages = ", libsimavr-dev and libelf-dev" if "simavr" in self.libraries else ""
+        return f"setuptools and cffi from PyPI, a C compiler, python3-dev{packages}"
+
+    @property
     def leaf(self) -> str:
         return self.name.rpartition("/")[2]
 
@@ -86,11 +91,14 @@ def compile_part(part: Part, target: Path) -> None:
         new.replace(target)  # atomic: a running process keeps the object that it has loaded
 
 
-def main(names: list[str]) -> int:
+def main(names: list[str]) -> int | str:
     for part in PARTS:
         if (not names or part.name in names) and not part.is_fresh():
             print(f"compiling virtual_robot/{part.name}", flush=True)
-            compile_part(part, part.built)
+            try:
+                compile_part(part, part.built)
+            except Exception as error:  # cffi raises several kinds, even a plain Exception without setuptools
+                return f"error: {error}\nvirtual_robot/{part.name} did not compile; it needs {part.needs}"
     return 0
 
 

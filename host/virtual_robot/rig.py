@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from virtual_robot.effects import plant_parameters
-from virtual_robot.errors import FirmwareError, PortClosedError
+from virtual_robot.errors import FirmwareError, PortClosedError, VirtualRobotError
 from virtual_robot.instruments import Instruments, Noise
 from virtual_robot.plant import Plant
 from virtual_robot.plant import profile as parameters_in
@@ -26,7 +26,8 @@ from virtual_robot.pty_server import serve
 from virtual_robot.sealed import draw_effects, specimen
 from virtual_robot.uno import CLOCK_HZ, Uno
 
-FIRMWARE = Path(__file__).resolve().parents[2] / ".pio" / "build" / "uno" / "firmware.elf"
+CLONE = Path(__file__).resolve().parents[2]  # if installed with `pip install -e`
+FIRMWARE = CLONE / ".pio" / "build" / "uno" / "firmware.elf"
 _USB_FRAME_S = 1e-3  # the USB chip passes bytes on once per millisecond
 _GAUGED_PSI = round(int(8.5 / 130.0 * 4096) / 4096 * 130.0, 4)  # 8.5 psi in whole counts of the converter
 
@@ -233,4 +234,10 @@ def open_rig(
 def _default_image() -> Path:
     """The image built in this checkout, else one that an installed package offers by the entry point `bifa.images`."""
     offered = () if FIRMWARE.is_file() else (entry.load()() for entry in entry_points(group="bifa.images"))
-    return next((path for path in offered if path), FIRMWARE)
+    found = next((path for path in offered if path), FIRMWARE)
+    if not found.is_file() and not (CLONE / "platformio.ini").is_file():
+        raise VirtualRobotError(
+            "no firmware image is installed: install a release's wheel of bifa, which carries one, or install the "
+            "virtual robot with `pip install -e host/virtual_robot` in a clone and build one there: `pio run -e uno`"
+        )
+    return found

@@ -11,6 +11,7 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -64,7 +65,7 @@ class Sheet:
         above, heads, self._rows = self._workbook() if form.format == "xlsx" else self._text()
         header, units = heads[: len(heads) - form.units_rows], heads[len(heads) - form.units_rows :]
         if form.units_above is not None:
-            units = [*(cells for _, cells in self._labelled(form.units_above, above)[-1:]), *units]
+            units = [*(cells for _, cells in self._labeled(form.units_above, above)[-1:]), *units]
         width = max([len(row) for row in heads], default=0)
         width = width if form.header_rows else max(width, self._first_width())
         self.names = [_parts(header, place) for place in range(width)]
@@ -117,7 +118,7 @@ class Sheet:
         """Return the index of the first row of names."""
         header, upper, begins = self._form.header, self._form.header_rows - 1, [self._form.skip_rows]
         if header is not None:
-            lasts = (place for place, _ in self._labelled(header, lines) if place >= max(upper, self._form.skip_rows))
+            lasts = (place for place, _ in self._labeled(header, lines) if place >= max(upper, self._form.skip_rows))
             begins = [place - upper for place in lasts]
         if not begins:
             raise self._error(f"no line begins with {header!r}, the declared header of the column names{self._which}")
@@ -126,7 +127,7 @@ class Sheet:
         below = self._below(self._form.above, lines[: begins[-1]])
         return next(begin for begin in begins if begin >= below)
 
-    def _labelled(self, label: str, lines: Sequence[str]) -> list[tuple[int, list[str]]]:
+    def _labeled(self, label: str, lines: Sequence[str]) -> list[tuple[int, list[str]]]:
         """Indices and cells of the lines whose first cell is `label`."""
         split = [(place, self._cells(line)) for place, line in enumerate(lines) if label in line]
         return [(place, cells) for place, cells in split if cells and cells[0].strip() == label]
@@ -197,21 +198,21 @@ class Sheet:
         quote), the cells line by line as written."""
         import pandas
 
-        try:
-            frame = pandas.read_csv(
-                io.BytesIO(self._rows),
-                header=None,
-                sep=r"\s+" if self._form.separator == " " else self._form.separator,
-                decimal=self._form.decimal,
-                encoding=self._encoding,
-                skip_blank_lines=False,
-                skipinitialspace=True,
-                keep_default_na=False,
-                na_values=[""],
-                **_exact(),
-            )
-        except (ValueError, OverflowError, pandas.errors.ParserError):
-            frame = None
+        frame = None
+        with suppress(ValueError, OverflowError, pandas.errors.ParserError):
+            if b"\0" not in self._rows:  # where pandas before 3.1 would end the cell
+                frame = pandas.read_csv(
+                    io.BytesIO(self._rows),
+                    header=None,
+                    sep=r"\s+" if self._form.separator == " " else self._form.separator,
+                    decimal=self._form.decimal,
+                    encoding=self._encoding,
+                    skip_blank_lines=False,
+                    skipinitialspace=True,
+                    keep_default_na=False,
+                    na_values=[""],
+                    **_exact(),
+                )
         if frame is not None and len(frame) == len(self._lines):
             return frame
         written = [self._written(row) for row in range(len(self._lines))]

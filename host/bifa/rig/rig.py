@@ -12,6 +12,7 @@ from bifa.rig.ports import serial_ports, uno_ports
 from bifa.rig.serial_transport import SerialTransport
 
 ENTRY_POINTS = "bifa.rigs"
+GET_VIRTUAL = "in a clone, on Linux: `make setup`, or `pip install -e host/virtual_robot` (needs libsimavr)"
 
 
 class RigError(BifaError):
@@ -96,6 +97,8 @@ def is_offered(port: str | None) -> bool:
 def check_port(port: str | None) -> None:
     """Raise RigError if `port` can be neither a rig nor a device, before anything slow is done."""
     rigs = entry_points(group=ENTRY_POINTS).names
+    if port == "virtual" and port not in rigs:
+        raise RigError(f"the virtual robot is not installed; {GET_VIRTUAL}")
     if port is not None and port not in rigs and not re.search(r"[/\\]|^COM", port, re.IGNORECASE):
         raise RigError(f"{port!r} is neither a rig (available: {', '.join(sorted(rigs)) or 'none'}) nor a device")
 

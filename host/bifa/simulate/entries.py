@@ -28,7 +28,7 @@ def entry_source() -> str:
     lines = [f'"""Generated; sources {generated.digest(*sources())}."""', "from numba import njit"]
     lines += [f"from {entry.__module__} import {entry.__name__} as _{entry.__name__}" for entry in _ENTRIES]
     for entry in _ENTRIES:
-        arguments = ", ".join(inspect.signature(entry.py_func).parameters)
+        arguments = ", ".join(inspect.signature(entry).parameters)
         lines += ["", "", '@njit(cache=True, nogil=True, error_model="numpy")']
         lines += [f"def {entry.__name__}({arguments}):", f"    return _{entry.__name__}({arguments})"]
     return "\n".join(lines) + "\n"

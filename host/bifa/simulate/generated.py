@@ -20,6 +20,9 @@ from types import ModuleType
 
 import numba
 
+from bifa.errors import BifaError
+from bifa.files import write_text
+
 _KEEP_S = 30 * 86400.0
 
 
@@ -31,16 +34,15 @@ def digest(*texts: str) -> str:
 
 def folder() -> Path:
     """Folder of generated code: BIFA_CACHE_DIR, else in the user's cache, else a private temporary folder."""
-    named = os.environ.get("BIFA_CACHE_DIR")
-    chosen = Path(named) if named is not None else _users_cache() / "bifa"
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: no home directory
+        chosen = Path(os.environ.get("BIFA_CACHE_DIR") or _users_cache() / "bifa")
         chosen.mkdir(parents=True, exist_ok=True)
         if os.access(chosen, os.W_OK):
             return chosen
     try:
         return temporary_folder()
     except OSError as error:
-        raise OSError("no writable folder for compiled code: set BIFA_CACHE_DIR to one") from error
+        raise BifaError("no writable folder for compiled code: set BIFA_CACHE_DIR to one") from error
 
 
 def _users_cache() -> Path:
@@ -72,8 +74,12 @@ def load(stem: str, source: str) -> ModuleType:
     if name in sys.modules:
         return sys.modules[name]
     path = folder() / f"{name}.py"
+    for compiled in path.parent.glob(f"__pycache__/{name}.*.nb[ci]"):
+        with contextlib.suppress(OSError):
+            if not compiled.stat().st_size:  # after a power cut; numba would fail
+                compiled.unlink()
     if not path.exists():
-        _write(path, source)
+        write_text(path, source)
         forget_old(path.parent)
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
@@ -86,13 +92,6 @@ def load(stem: str, source: str) -> ModuleType:
         del sys.modules[name]
         raise
     return module
-
-
-def _write(path: Path, source: str) -> None:
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(source)
-    os.replace(temporary, path)
 
 
 def forget_old(cache: Path) -> None:

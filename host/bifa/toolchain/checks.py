@@ -15,6 +15,7 @@ from bifa.link import Uno
 from bifa.link.table import PROTOCOL_VERSION, TABLE_HASH
 from bifa.rig import open_rig
 from bifa.rig.ports import serial_ports
+from bifa.rig.rig import GET_VIRTUAL
 from bifa.toolchain.flash import avrdude_program
 from bifa.toolchain.project import find_project, image_path, platformio_program, project_folder
 
@@ -95,7 +96,7 @@ def _carried(what: str) -> Check:
 
 def _virtual_rig(what: str) -> Check:
     if not importlib.metadata.entry_points(group="bifa.rigs", name="virtual"):
-        return Check(what, OPTIONAL, "not installed", "run `make setup`, or pip install -e host/virtual_robot")
+        return Check(what, OPTIONAL, "not installed", GET_VIRTUAL)
     try:
         open_rig("virtual").close()
     except Exception as error:  # a rig from another package may raise anything

@@ -18,7 +18,7 @@ def find_project() -> Path | None:
     """Return the clone that this package belongs to, or else the one around the working directory, if any."""
     here = Path.cwd()
     for folder in (Path(bifa.__file__).resolve().parents[2], here, *here.parents):
-        if (folder / "platformio.ini").is_file() and (folder / "firmware").is_dir():
+        if (folder / "platformio.ini").is_file() and (folder / "schema" / "commands.toml").is_file():
             return folder
     return None
 
@@ -27,7 +27,7 @@ def project_folder() -> Path:
     """Return the clone. Raises ToolchainError if there is none."""
     if folder := find_project():
         return folder
-    raise ToolchainError("no platformio.ini and firmware/ here; run this in a clone of the repository")
+    raise ToolchainError("no platformio.ini and schema/commands.toml here; run this in a clone of the repository")
 
 
 def platformio_program() -> Path:

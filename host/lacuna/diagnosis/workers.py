@@ -30,7 +30,7 @@ class Workers:
 
     def __init__(self, on_progress: OnProgress, executor: Executor | None = None, *, forks: bool = False):
         self.on_progress, self._executor = on_progress, executor
-        self._forks = forks and sys.platform == "linux" and not current_process().daemon
+        self._forks = forks and sys.platform == "linux" and not current_process().daemon and _has_semaphores()
 
     def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable[..., Any], jobs: Jobs) -> list[Any]:
         """`function(*job)` for each of `jobs`, in their order. `names`: the effects of each job, for progress messages;
@@ -52,6 +52,15 @@ class Workers:
                 yield results
         else:
             yield (function(*job) for job in jobs)
+
+
+def _has_semaphores() -> bool:
+    """Whether children can be synchronized: not without a writable /dev/shm, as in some containers."""
+    try:
+        get_context("fork").Lock()
+    except (OSError, ImportError):
+        return False
+    return True
 
 
 @contextmanager

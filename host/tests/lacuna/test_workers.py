@@ -1,5 +1,6 @@
 """The workers of a search: the same results whoever computes them, and no process left behind."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -59,6 +60,18 @@ def test_children_answer_in_order_what_need_not_be_shipped(cores):
 def test_one_core_or_one_job_needs_no_children_and_a_system_may_forbid_them(cores, count, jobs, forks):
     cores(count)
     found = Workers(lambda _: None, forks=forks).map("trying", NAMES[: len(jobs)], lambda _: os.getpid(), jobs)
+    assert set(found) == {os.getpid()}
+
+
+def test_where_children_cannot_be_synchronized_there_are_none(cores, monkeypatch):
+    """As without a writable /dev/shm."""
+
+    def refuse(*_):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    cores(2)
+    monkeypatch.setattr("_multiprocessing.SemLock", refuse)
+    found = Workers(lambda _: None, forks=True).map("trying", NAMES, lambda _: os.getpid(), JOBS)
     assert set(found) == {os.getpid()}
 
 

@@ -66,7 +66,7 @@ def test_a_hook_calls_what_lint_calls(hook):
 @pytest.mark.parametrize(
     "hook", [hook for hook in hooks() if hook["id"].startswith(("ruff", "generated"))], ids=lambda hook: hook["id"]
 )
-def test_a_hook_passes_on_this_tree(hook):
+def test_a_hook_passes_on_this_tree(clone, hook):
     """A hook passes on the files that pre-commit would give it."""
     program, *arguments = hook["entry"].split()
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import wheels
 from stranger import Stranger, lowest
 
 from bifa.data import write_dataset
@@ -18,7 +19,8 @@ from virtual_robot.uno import Uno
 from virtual_robot.uno.board import lib as chip
 
 FOLDERS = {"lacuna_engine": "lacuna", "bifa": "bifa", "virtual_robot": "virtual_robot"}
-BOUND = ("numpy", "scipy", "pandas", "numba", "matplotlib")
+ENGINE = ("numpy", "scipy", "pandas", "matplotlib")
+BOUND = (*ENGINE, "numba", "typer", "rich", "prompt_toolkit", "starlette", "uvicorn", "wsproto")
 OLDEST_PYTHON = pytest.mark.skipif(
     sys.version_info >= (3, 12), reason="the oldest versions have no wheels for Python newer than 3.11"
 )
@@ -56,6 +58,28 @@ def test_a_wheel_holds_every_file_of_its_package_and_the_license(root, built, na
     assert all(file.endswith((".so", ".pyd")) or file in IMAGE for file in beside), beside
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("folder", "name"), [("host", "bifa"), ("host/lacuna", "lacuna")])
+def test_a_module_that_an_earlier_build_left_behind_is_not_in_the_wheel(clone, tmp_path, folder, name):
+    """As after `pip install ./host/lacuna ./host`, `git pull` and the same again: `bifa` runs every module in cli/."""
+    package = wheels.copy_tree(tmp_path) / folder
+    left = package / "build" / "lib" / name / "cli" / "gone.py"
+    left.parent.mkdir(parents=True)
+    left.write_text("import gone\n")
+    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
+    subprocess.run([*pip, "--wheel-dir", tmp_path, package], check=True)
+    with zipfile.ZipFile(next(tmp_path.glob("*.whl"))) as archive:
+        assert f"{name}/__init__.py" in archive.namelist()
+        assert f"{name}/cli/gone.py" not in archive.namelist()
+
+
+def test_without_git_the_tool_says_how_to_build(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(wheels, "ROOT", tmp_path)
+    with pytest.raises(SystemExit):
+        wheels.main([str(tmp_path / "dist")])
+    assert "pip wheel ./host/lacuna ./host" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("folder", ["host", "host/lacuna"])
 def test_the_license_of_a_package_is_that_of_the_project(root, folder):
     assert (root / folder / "LICENSE").read_text() == (root / "LICENSE").read_text()
@@ -68,7 +92,7 @@ def test_the_wheels_work_in_an_empty_environment(root, built, index, tmp_path, v
     stranger = Stranger(tmp_path)
     engine, *robots = (built[name] for name in FOLDERS)
     pinned = lowest([engine, *robots], *BOUND) if versions == "oldest" else []
-    stranger.install(f"{engine}[tables]", *(pin for pin in pinned if not pin.startswith("numba")))
+    stranger.install(f"{engine}[tables]", *(pin for pin in pinned if pin.startswith(ENGINE)))
     stranger.run("python", "-c", IMPORT_ALL, "lacuna")
     ten_minutes(root, stranger)
     stranger.install(*robots, *pinned)

@@ -1,5 +1,7 @@
 """`--port`: wrong ports are reported, and a serial port is opened exclusively."""
 
+from importlib.metadata import EntryPoints
+
 import pytest
 
 from bifa.link import PortGoneError, Uno
@@ -12,6 +14,12 @@ def test_wrong_ports_are_named():
         open_rig("virtuall")
     with pytest.raises(PortGoneError, match="/dev/does-not-exist"):
         open_rig("/dev/does-not-exist")
+
+
+def test_the_virtual_robot_that_is_not_installed_is_said_how_to_get(monkeypatch):
+    monkeypatch.setattr("bifa.rig.rig.entry_points", lambda group: EntryPoints(()))
+    with pytest.raises(RigError, match=r"not installed; .*`pip install -e host/virtual_robot`"):
+        open_rig("virtual", seed=1)
 
 
 def test_a_serial_port_exclusive_and_unplugged():

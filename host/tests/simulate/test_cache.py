@@ -1,5 +1,6 @@
 """Compiled code is cached, and never older than its sources."""
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -7,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from bifa.errors import BifaError
+from bifa.files import TargetError
 from bifa.simulate import entries, generated
+from bifa.simulate.lanes import program
 
 _SECOND_START = """
 from bifa import robot, simulate
@@ -36,11 +40,45 @@ def test_a_changed_source_gets_another_file(tmp_path, monkeypatch):
     assert len(list(tmp_path.glob("bifa_sample_*.py"))) == 2
 
 
+def test_a_full_disk_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path))
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+        with pytest.raises(TargetError, match=r"bifa_sample_\w+\.py cannot be written"):
+            generated.load("sample", "value = 1" + 100 * " " + "\n")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("empty", ["__pycache__/*.nbi", "__pycache__/*.nbc"])
+def test_a_file_of_numba_that_a_power_cut_left_empty_is_written_again(tmp_path, monkeypatch, empty):
+    monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path))
+    source = "from numba import njit\n\n\n@njit(cache=True)\ndef one():\n    return 1\n"
+    for _ in range(2):
+        module = generated.load("sample", source)
+        assert module.one() == 1
+        del sys.modules[module.__name__]
+        (path,) = tmp_path.glob(empty)
+        path.write_bytes(b"")
+
+
 def test_the_entries_name_depends_on_every_compiled_source():
     sources = "".join(entries.sources())
     for told in ("def march(", "def step(", "def pressure_after(", "Dahl's equation", "def static_record("):
         assert told in sources
     assert entries.entries.__name__.endswith(generated.digest(entries.entry_source()))
+
+
+def test_the_code_is_the_same_where_numba_compiles_nothing():
+    """NUMBA_DISABLE_JIT=1 is for debugging: numba's decorators then return the functions themselves."""
+    told = "from bifa.simulate import entries; from bifa.simulate.lanes import program; "
+    told += "print(entries.entry_source() + program.source())"
+    command, environ = [sys.executable, "-c", told], {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(command, env=environ, capture_output=True, text=True, encoding="utf-8", check=True)
+    assert done.stdout == entries.entry_source() + program.source() + "\n"
 
 
 @pytest.fixture
@@ -57,6 +95,28 @@ def no_cache(tmp_path, monkeypatch) -> Path:
 
 def _privately(folder: Path) -> bool:
     return folder.is_dir() and folder.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.fixture
+def no_home(no_cache, monkeypatch):
+    """As in containers: neither HOME nor an entry in /etc/passwd."""
+
+    def refuse():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("BIFA_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", refuse)
+
+
+def test_without_a_home_directory_code_lives_in_the_temporary_folder(no_cache, no_home):
+    assert generated.folder().parent == no_cache
+
+
+def test_without_any_folder_the_error_says_what_to_set(no_cache, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(no_cache / "missing"))
+    with pytest.raises(BifaError, match="set BIFA_CACHE_DIR"):
+        generated.folder()
 
 
 def test_without_a_cache_code_lives_in_a_private_temporary_folder(no_cache):

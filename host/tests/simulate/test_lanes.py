@@ -3,6 +3,7 @@
 import ctypes
 import math
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -260,6 +261,23 @@ def test_without_a_compiler_numba_does_it_and_one_line_says_so(tmp_path):
     assert "no C compiler" in ended.stderr
 
 
+def test_a_kernel_that_cannot_be_loaded_is_reported_and_numba_does_it(tmp_path, monkeypatch, capsys):
+    """As in a folder mounted `noexec`, or after a power cut."""
+    (tmp_path / "kernel.so").write_text("no library")
+    monkeypatch.setattr(build, "library", lambda chosen: tmp_path / "kernel.so")
+    assert kernel.kernels.__wrapped__() is None
+    assert "kernel.so: " in (said := capsys.readouterr().err)
+    assert "set BIFA_CACHE_DIR" in said
+
+
+def test_the_variable_of_the_compiler_may_hold_arguments(tmp_path, monkeypatch):
+    (tmp_path / "ccache").write_text('#!/bin/sh\nexec "$@"\n')
+    (tmp_path / "ccache").chmod(0o755)
+    monkeypatch.setenv("CC", f"{tmp_path}/ccache {shutil.which('gcc') or 'clang'}")
+    build.compile_to(tmp_path / "kernel.so", build.single())
+    assert kernel.Kernel(tmp_path / "kernel.so").lanes == 1
+
+
 # -- the translator --------------------------------------------------------------------------------------------------
 
 
@@ -328,7 +346,7 @@ def test_a_translated_function_does_in_each_lane_what_python_does(function, widt
     )
     (tmp_path / "f.c").write_text("typedef struct { const double *at; long size; } Series;\n" + source)
     flags = next((t.flags for t in build.TARGETS if t.lanes == width), ())
-    command = [build.compiler(), *build.FLAGS, *flags, f"-DLANES={width}", tmp_path / "f.c", "-o", tmp_path / "f.so"]
+    command = [*build.compiler(), *build.FLAGS, *flags, f"-DLANES={width}", tmp_path / "f.c", "-o", tmp_path / "f.so"]
     subprocess.run([*map(str, command), "-lm"], check=True)
     run = ctypes.CDLL(str(tmp_path / "f.so")).run
     run.argtypes = [np.ctypeslib.ndpointer(float)] * 3

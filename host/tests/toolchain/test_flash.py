@@ -79,7 +79,11 @@ def test_without_platformio_the_sentence_names_the_remedy(monkeypatch, tmp_path)
         project.platformio_program()
 
 
-def test_outside_a_clone_is_said(monkeypatch, tmp_path):
+@pytest.mark.parametrize("is_other_project", [False, True])
+def test_outside_a_clone_is_said_and_another_project_is_no_clone(monkeypatch, tmp_path, is_other_project):
+    if is_other_project:
+        (tmp_path / "platformio.ini").write_text("[env:uno]\n")
+        (tmp_path / "firmware").mkdir()
     monkeypatch.setattr(project.bifa, "__file__", str(tmp_path / "site-packages" / "bifa" / "__init__.py"))
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ToolchainError, match="in a clone of the repository"):

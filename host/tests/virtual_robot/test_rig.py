@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from virtual_robot import build
 from virtual_robot.errors import PortClosedError, VirtualRobotError
 from virtual_robot.instruments.bench import StandError
 from virtual_robot.rig import open_rig
@@ -220,6 +221,22 @@ def test_effects_can_be_put_in_or_sealed(bench):
 def test_without_an_image_the_rig_says_what_to_build(tmp_path):
     with pytest.raises(VirtualRobotError, match="pio run -e uno"):
         open_rig(firmware=tmp_path / "none.elf")
+
+
+def test_an_installation_outside_a_clone_says_where_an_image_comes_from(tmp_path, monkeypatch):
+    monkeypatch.setattr("virtual_robot.rig.CLONE", tmp_path)
+    monkeypatch.setattr("virtual_robot.rig.FIRMWARE", tmp_path / "firmware.elf")
+    with pytest.raises(VirtualRobotError, match=r"install a release's wheel of bifa.* -e host/virtual_robot"):
+        open_rig()
+
+
+def test_a_part_that_does_not_compile_says_what_it_needs(tmp_path, monkeypatch):
+    monkeypatch.setattr(build, "HERE", tmp_path)
+    for part in build.PARTS:
+        part.folder.mkdir(parents=True)
+        (part.folder / part.header).write_text("")
+    (build.PARTS[-1].folder / "uno.c").write_text("#error no such header\n")
+    assert "needs setuptools and cffi from PyPI, a C compiler, python3-dev, libsimavr-dev" in build.main(["uno"])
 
 
 def test_the_firmwares_image_walks_the_baseline_at_the_papers_speed():

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from bifa.files import written
 from bifa.simulate import entries, generated
 
 FLAGS = (
@@ -36,8 +37,8 @@ TARGETS = (
 )
 
 
-class NoCompilerError(Exception):
-    """The kernel cannot be compiled here; the text says why."""
+class NoKernelError(Exception):
+    """The kernel cannot be compiled or loaded here; the text says why."""
 
 
 @cache
@@ -54,16 +55,17 @@ def single() -> Target:
     return Target(1, target().flags if target().lanes > 2 else (), ())
 
 
-def compiler() -> str:
-    """Path of the C compiler: CC, else cc, gcc or clang. Raises NoCompilerError if there is none."""
-    for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
-        if name and (found := shutil.which(name.split()[0])):
-            return found
-    raise NoCompilerError("no C compiler (Debian: gcc)")
+def compiler() -> list[str]:
+    """Command of the C compiler: CC, which may have arguments, else cc, gcc or clang. Raises NoKernelError if there is
+    none."""
+    for command in (os.environ.get("CC", "").split(), ["cc"], ["gcc"], ["clang"]):
+        if command and (found := shutil.which(command[0])):
+            return [found, *command[1:]]
+    raise NoKernelError("no C compiler (Debian: gcc)")
 
 
 def library(chosen: Target) -> Path:
-    """Path of the compiled kernel, compiled now if missing. Raises NoCompilerError if that fails."""
+    """Path of the compiled kernel, compiled now if missing. Raises NoKernelError if that fails."""
     texts = [(HERE / name).read_text("utf-8") for name in _OWN]
     name = f"bifa_lanes_{generated.digest(*entries.sources(), *texts, *FLAGS, *chosen.flags)}_{chosen.lanes}.so"
     path = generated.folder() / name
@@ -76,16 +78,15 @@ def library(chosen: Target) -> Path:
 
 
 def compile_to(path: Path, chosen: Target) -> None:
-    """Compile a kernel to `path`. Raises NoCompilerError if that fails."""
+    """Compile a kernel to `path`. Raises NoKernelError if that fails."""
     from bifa.simulate.lanes import program
 
-    command = [compiler(), *FLAGS, *chosen.flags, f"-DLANES={chosen.lanes}"]
-    with tempfile.TemporaryDirectory(dir=path.parent) as scratch:
-        source, built = Path(scratch) / "lanes.c", Path(scratch) / "lanes.so"
+    command = [*compiler(), *FLAGS, *chosen.flags, f"-DLANES={chosen.lanes}"]
+    with written(path) as built, tempfile.TemporaryDirectory(dir=path.parent) as scratch:
+        source = Path(scratch) / "lanes.c"
         source.write_text(program.source(), "utf-8")
         try:
             subprocess.run([*command, str(source), "-o", str(built), "-lm"], check=True, capture_output=True, text=True)
         except (OSError, subprocess.CalledProcessError) as e:
             told = (getattr(e, "stderr", None) or str(e)).strip().splitlines()
-            raise NoCompilerError(f"{command[0]} failed: {told[0] if told else e}") from e
-        os.replace(built, path)
+            raise NoKernelError(f"{command[0]} failed: {told[0] if told else e}") from e

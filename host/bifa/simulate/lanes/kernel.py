@@ -70,7 +70,10 @@ class Kernel:
     """A compiled kernel with `lanes` lanes. Its calls release the GIL."""
 
     def __init__(self, path: Path) -> None:
-        library = ctypes.CDLL(str(path))
+        try:
+            library = ctypes.CDLL(str(path))
+        except OSError as e:  # a damaged file, or a folder mounted `noexec`
+            raise build.NoKernelError(f"{e}; delete that file, or set BIFA_CACHE_DIR to another folder") from e
         self.lanes = library.lanes_of_kernel()
         library.refused_effects.restype, library.refusals.restype = ctypes.c_int64, ctypes.c_char_p
         self.refused, self.refusals = library.refused_effects(), library.refusals().decode()
@@ -169,14 +172,14 @@ def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
 
 @cache
 def kernels() -> tuple[Kernel, Kernel] | None:
-    """A kernel with this processor's lanes and one with a single lane. None if BIFA_LANES is 0, or without a compiler,
-    which is then reported once."""
+    """A kernel with this processor's lanes and one with a single lane. None if BIFA_LANES is 0, or if they cannot be
+    compiled or loaded, which is then reported once."""
     if os.environ.get("BIFA_LANES") == "0":
         return None
     try:
         found = Kernel(build.library(build.target())), Kernel(build.library(build.single()))
-    except build.NoCompilerError as e:
-        print(f"bifa: simulations run one at a time, in numba: {e}", file=sys.stderr)
+    except build.NoKernelError as e:
+        print(f"bifa: simulations run one at a time, in numba (a minute to compile at first): {e}", file=sys.stderr)
         return None
     if found[0].refused:
         print(f"bifa: these effects cannot be vectorised and run serially: {found[0].refusals}", file=sys.stderr)

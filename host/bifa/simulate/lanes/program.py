@@ -64,7 +64,10 @@ _CALLED = (
 )
 
 
-_SHARED = {f.py_func for f in (stepper.step, stepper._small, stepper._limit, stepper._first_to_start, march.pressures)}
+_SHARED = {
+    getattr(f, "py_func", f)
+    for f in (stepper.step, stepper._small, stepper._limit, stepper._first_to_start, march.pressures)
+}
 
 
 def _apart(function: Callable[..., Any]) -> bool:
