@@ -61,6 +61,8 @@ def read_runs(folders: Sequence[Path]) -> list[Campaign]:
 
 
 def _read(name: str, folder: Path) -> Campaign:
+    if folder.is_file():
+        raise CompareError(f"{folder} is a file, not a campaign's folder: name only folders")
     try:
         summary = dict(json.loads((folder / "summary.json").read_text()))
         if missing := sorted(_NEEDED - summary.keys()):

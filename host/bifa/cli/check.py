@@ -56,11 +56,11 @@ def check(
         raise typer.Exit(1)
 
 
-def warn_of_units(console: "Console", dataset: "Dataset") -> None:
-    """Warn of likely mistakes in units, which would upset a fit or be mistaken for an effect."""
+def warn_of_findings(console: "Console", dataset: "Dataset") -> None:
+    """Warn of likely mistakes, which would upset a fit or be mistaken for an effect."""
     from bifa.check.plausibility import check_plausibility
 
-    _print_findings(console, [finding for finding in check_plausibility(dataset) if finding.kind == "unit"])
+    _print_findings(console, check_plausibility(dataset))
 
 
 def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:

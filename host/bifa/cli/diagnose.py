@@ -11,7 +11,7 @@ import typer
 from bifa import cluster
 from bifa.cli._options import BENCH_FILE, DATASET, WATCH, file_option, port_option, requires
 from bifa.cli.campaign import at_desk
-from bifa.cli.check import warn_of_units
+from bifa.cli.check import warn_of_findings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -74,6 +74,7 @@ def diagnose(
     """Fit the base model, find what its residuals have in common across repeats, name the cause, and add it to the
     model. Reports the error before and after on held-out trials. The exit status is 0 for any verdict."""
     from contextlib import nullcontext
+    from dataclasses import replace
 
     from bifa.files import check_targets, named
     from bifa.rig import check_port, is_offered
@@ -98,7 +99,7 @@ def diagnose(
 
         good_enough = accuracies(matters or ())
         measured = read_dataset(dataset)
-        warn_of_units(console, measured)
+        warn_of_findings(console, measured)
     beside = named(dataset)
     resolved = beside.with_name(f"{beside.name}-resolved")  # where --resolve records
     hands = None
@@ -108,6 +109,7 @@ def diagnose(
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
     with console.status("starting"):
+        from bifa.identify.doubts import assumed_curves, repeats_apart
         from bifa.identify.start import prepare
         from bifa.report.words import spoken
         from lacuna.diagnosis import diagnose as engine
@@ -122,9 +124,10 @@ def diagnose(
             system = prepare(trials, robot)
             system.accuracies = good_enough
             suspected = {*(suspect or ()), *confusable}
-            return engine.diagnose(
+            found = engine.diagnose(
                 system, seed=seed, suspected=suspected, on_progress=report_progress, executor=executor
             )
+            return replace(found, warnings=(*assumed_curves(system), *repeats_apart(found.base), *found.warnings))
 
         with workers as (executor, _):
             found = run_diagnosis(measured)

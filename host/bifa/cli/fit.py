@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import DATASET, PICTURES, file_option
-from bifa.cli.check import warn_of_units
+from bifa.cli.check import warn_of_findings
 
 EXAMPLES = (
     "bifa fit out/bench --out model.toml",
@@ -48,7 +48,7 @@ def fit(
         from bifa.robot import load_model, save_model
 
         measured = read_dataset(dataset)
-        warn_of_units(console, measured)
+        warn_of_findings(console, measured)
     begun = time.perf_counter()
     columns = (SpinnerColumn(), words("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 from bifa.errors import BifaError
 
+# As in bifa.data, which is not imported here.
+EXPERIMENTS = ("static_loading", "step_response", "anchor_pull", "locomotion")
+
 
 class EffectError(BifaError):
     """An effect's name, parameter or value is wrong; the text gives the name and the range."""
@@ -58,6 +61,19 @@ class PhysicalEffect:
     freed_at: tuple[str, ...] = ()
     apart: tuple[str, ...] = ()
     unlike_cycles: bool = False
+
+    def __post_init__(self) -> None:
+        for field, kind in (("parameters", EffectParameter), *((f, str) for f in ("experiments", "freed_at", "apart"))):
+            if isinstance(alone := getattr(self, field), kind):  # a tuple of one that lacks its comma
+                object.__setattr__(self, field, (alone,))
+        if unknown := [name for name in self.experiments if name not in EXPERIMENTS]:
+            raise EffectError(f"{self.name}: no experiment is {', '.join(unknown)}; there are {', '.join(EXPERIMENTS)}")
+        if self.states not in (0, 1):
+            raise EffectError(f"{self.name}: states = {self.states}, but an effect has 1 state for each actuator, or 0")
+        for size in self.sizes:
+            if not size.lower <= 0.0 <= size.upper:
+                bounds = f"{size.lower:g} to {size.upper:g}"
+                raise EffectError(f"{self.name}.{size.name} is a size, 0 if the effect is absent, but within {bounds}")
 
     @property
     def sizes(self) -> tuple[EffectParameter, ...]:

@@ -21,7 +21,7 @@ from bifa.problem.system import RobotSystem, fittable
 from bifa.robot import Model, ModelParameterError
 from lacuna.estimation.solve import one_thread
 
-_ACTUATORS = {"large": "body", "small": "small"}
+ACTUATORS = {"large": "body", "small": "small"}
 _SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that is taken for its supply
 _SETTLED_MM_S = 0.5  # slower than this an actuator is at rest
 _SAMPLES = 20  # from which that is judged
@@ -44,9 +44,8 @@ def prepare(
     _refuse_completed(model)
     on_progress("static loading: stiffness and area")
     statics = fit_statics(dataset)
-    values = _known(dataset, model) | _supplies(dataset, model)
-    values |= {f"{_ACTUATORS[a]}_area_N_psi": fit.area_N_psi.value for a, fit in statics.items() if fit.area_N_psi}
-    curves = {_ACTUATORS[a]: _curve(dataset, fit, values, model) for a, fit in statics.items()}
+    values = _known(dataset, model) | _supplies(dataset, model) | _areas(statics, model)
+    curves = {ACTUATORS[a]: _curve(dataset, fit, values, model) for a, fit in statics.items()}
     system = RobotSystem(dataset, model.with_values(values), curves, fittable(dataset, curves))
     if not system.parameters:
         raise UndeterminedError("these trials constrain no unknown parameter of the model")
@@ -66,7 +65,7 @@ def _refuse_completed(model: Model) -> None:
 def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
     """Static fits of the actuators loaded at 0 psi; step responses, if any, limit how far the curve is continued."""
     found = {}
-    for actuator in _ACTUATORS:
+    for actuator in ACTUATORS:
         try:
             found[actuator] = fit_static(dataset, actuator, _reach_m(dataset, actuator))
         except UndeterminedError:
@@ -74,9 +73,25 @@ def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
     return found
 
 
+def _areas(statics: Mapping[str, StaticFit], model: Model) -> dict[str, float]:
+    """Areas of the static stage. Raises UndeterminedError for one that no actuator has."""
+    found = {}
+    for actuator, fit in statics.items():
+        if fit.area_N_psi is not None:
+            parameter, area = model.parameters[f"{ACTUATORS[actuator]}_area_N_psi"], fit.area_N_psi.value
+            try:
+                found[parameter.name] = parameter.with_value(area).value
+            except ModelParameterError as error:
+                raise UndeterminedError(
+                    f"the static loadings of the {actuator} actuator contradict their pressures: {error}. Check the "
+                    "sign and unit of force_N, and each trial's pressure_psi and actuator in dataset.toml"
+                ) from None
+    return found
+
+
 def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model: Model) -> FittedCurve:
     """The static curve, pinned at the actuator's rest positions in step responses."""
-    prefix, stiffness = _ACTUATORS[fit.actuator], fit.stiffness
+    prefix, stiffness = ACTUATORS[fit.actuator], fit.stiffness
     name = f"{prefix}_area_N_psi"
     area = values.get(name, model[name])
     rest_m, held_psi = _rests(dataset, fit.actuator).T
@@ -93,13 +108,18 @@ def _known(dataset: Dataset, model: Model) -> dict[str, float]:
             f"[known] in dataset.toml names {', '.join(unknown)}, which is not a parameter of the model; "
             f"there are {', '.join(model.parameters)}"
         )
+    for name, value in dataset.known.items():
+        try:
+            model.parameters[name].check(value)
+        except ModelParameterError as error:
+            raise ModelParameterError(f"[known] in dataset.toml: {error}") from None
     return dict(dataset.known)
 
 
 def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
     """Supplies that the lab did not measure, read off the sensors as initial values for the joint fit."""
     found = {}
-    vacuum = [psi for actuator in _ACTUATORS for _, psi in _rests(dataset, actuator) if psi < 0]
+    vacuum = [psi for actuator in ACTUATORS for _, psi in _rests(dataset, actuator) if psi < 0]
     if "supply_negative_psi" not in dataset.known and vacuum:
         found["supply_negative_psi"] = float(np.median(vacuum))
     walks = [t.columns["pressure_body_psi"] for t in dataset.of("locomotion") if t.pressure_psi is None]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bifa.data.dataset import conditions_of
+from bifa.data.dataset import conditions_of, labels_of
+from bifa.identify.doubts import repeats_apart
 from bifa.identify.identification import Identification
 from bifa.printable import counted
 from bifa.report.compared_curves import compared_curves
@@ -13,6 +14,7 @@ from bifa.report.evidence import BASE
 from bifa.report.page import ChartedSection, Page, PageTable
 from bifa.report.picture import draw_chart
 from bifa.report.words import channel_words, experiment_words, parameter_words, plain, quantity, spoken, unit_of
+from lacuna.check.repeats import odd_ones
 
 _MIN_CORRELATION = 0.9
 MAX_NOISE_RATIO = 1.1  # errors up to this many times the noise count as noise
@@ -60,9 +62,10 @@ def draw_curves(found: Identification, folder: Path) -> list[Path]:
 
 def parameters_and_remarks(found: Identification) -> list[ChartedSection]:
     """Sections with every parameter and its interval, and with remarks on them."""
+    labels = labels_of(found.system.dataset)
     return [
         ChartedSection("Parameters", tables=[_parameters(found)]),
-        ChartedSection("Notes", [spoken(line) for line in remarks(found)]),
+        ChartedSection("Notes", [spoken(line, labels) for line in remarks(found)]),
     ]
 
 
@@ -84,6 +87,7 @@ def remarks(found: Identification) -> list[str]:
         needs.setdefault(missing.needs, []).append(missing.name)
     for experiment, names in needs.items():
         lines.append(f"Not determined by this data: {', '.join(names)}. What would determine it: {experiment}.")
+    lines += [*repeats_apart(found.fit), *odd_ones(found.fit.problem.trials)]
     (experiment, channel), worst = max(found.error.items(), key=lambda item: item[1])
     if worst > MAX_NOISE_RATIO:
         lines.append(
@@ -100,14 +104,13 @@ def _parameters(found: Identification) -> PageTable:
     rows = []
     for name, parameter in found.model.parameters.items():
         interval, said = found.intervals.get(name), []
+        known, (low, high) = name in found.system.dataset.known, parameter.plausible
         if interval is None:
-            said.append("known" if name in found.system.dataset.known else "not determined")
-        else:
-            if estimates[name].at_bound:
-                said.append("at its bound")
-            if estimates[name].implausible:
-                low, high = (quantity(end, parameter.unit) for end in parameter.plausible)
-                said.append(f"expected {low} to {high}")
+            said.append("known" if known else "not determined")
+        elif estimates[name].at_bound:
+            said.append("at its bound")
+        if (known or interval is not None) and not low <= parameter.value <= high:
+            said.append(f"expected {quantity(low, parameter.unit)} to {quantity(high, parameter.unit)}")
         ends = "" if interval is None else " to ".join(plain(e, 4) for e in (interval.lower, interval.upper))
         rows.append([parameter_words(name), f"{plain(parameter.value, 4)}", ends, parameter.unit, ", ".join(said)])
     return PageTable(["", "value", "90 % interval", "unit", "remark"], rows, words=True)

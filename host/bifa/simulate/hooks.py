@@ -73,6 +73,10 @@ def chain_source() -> str:
     idle = [name for name in modules if not any(name in names for names in users.values())]
     if idle:
         raise EffectError(f"{', '.join(idle)} does not act: no function is named after a hook ({', '.join(HOOKS)})")
+    writers = [hook for hook, (_, combine) in HOOKS.items() if "{state}" in _COMBINED[combine][1]]
+    for name, effect in effects.library().items():
+        if effect.states and not any(name in users[hook] for hook in writers):
+            raise EffectError(f"{name} declares states=1, but its state never changes: define {' or '.join(writers)}")
     for hook, names in users.items():
         lines += _chain(hook, names)
     return "\n".join(lines) + "\n"

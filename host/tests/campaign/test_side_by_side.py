@@ -59,6 +59,9 @@ def test_what_is_no_finished_campaign_is_refused_with_what_to_do(tmp_path):
         read_runs([sample.finished(tmp_path / "a"), tmp_path / "b"])
     with pytest.raises(CompareError, match="two"):
         read_runs([tmp_path / "a"])
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(CompareError, match=r"notes\.txt is a file"):  # `bifa compare out/*`
+        read_runs([tmp_path / "a", tmp_path / "notes.txt"])
     for text in ("{", "[]", "null", '{"verdict": "none"}'):
         (tmp_path / "a" / "summary.json").write_text(text)
         with pytest.raises(CompareError, match=r"damaged .*--rerun compare"):

@@ -42,6 +42,19 @@ def test_the_same_in_many_files_is_said_once(shown):
     assert f"  {'; '.join(files)}\n" in output
 
 
+@pytest.mark.parametrize("command", ["fit", "diagnose"])
+def test_a_mistake_is_told_before_what_it_would_upset(tmp_path, day, monkeypatch, command):
+    monkeypatch.setenv("COLUMNS", "400")
+    wrong, loadings = day, [trial.file for trial in day.of("static_loading", "large")]
+    for file in loadings:
+        wrong = mistaken(wrong, file, turned("force_N"))
+    folder, model = write_dataset(tmp_path / "day", wrong), tmp_path / "model.toml"
+    result = CliRunner().invoke(app, [command, str(folder), "--out", str(model)])
+    assert f"warning [sign] {len(loadings)} trials, force_N: falls by" in result.output
+    assert "static loadings of the large actuator" in str(result.exception)
+    assert not model.exists()
+
+
 def test_a_sound_day_is_said_to_be_one(shown):
     status, output = shown()
     assert status == 0

@@ -138,14 +138,34 @@ def test_a_model_that_does_not_fit_says_so(found):
     assert any("4.2 times the noise in pressure_psi of step_response" in line for line in remarks(poor))
 
 
-def test_too_little_data_says_what_cannot_be_had(lab):
-    """Static loading of the large actuator alone determines its curve and its area, and nothing else."""
+@pytest.fixture(scope="module")
+def static_only(lab):
     trials = tuple(
         replace(lab.static("large", p, rate_mm_s=4.0, repeat=r), file=f"{p:g}_{r}.csv")
         for p in (0.0, 8.0)
         for r in (1, 2)
     )
-    found = identify(Dataset(path=None, name="static only", known={}, trials=trials))
+    return Dataset(path=None, name="static only", known={}, trials=trials)
+
+
+def test_repeats_that_differ_and_a_doubtful_known_value_do_not_pass_in_silence(found, static_only):
+    assert not any("Repeats of" in line for line in remarks(found))
+    *others, last = static_only.trials
+    turned_up = replace(last, columns=last.columns | {"pressure_psi": 1.06 * last.columns["pressure_psi"]})
+    odd = identify(replace(static_only, trials=(*others, turned_up), known={"head_mass_kg": 0.35}))
+    (line,) = (line for line in remarks(odd) if "Repeats of" in line)
+    assert re.search(r"Repeats of static_loading differ by 0\.\d+\s?psi in pressure_psi, \d+ times", line)
+    (line,) = (line for line in parameters_and_remarks(odd)[1].paragraphs if line.startswith("Trials"))
+    assert (
+        "(run 1) and static loading, large, 8 psi, 4 mm/s (run 2), repeats of one condition, differ in pressure" in line
+    )
+    (remark,) = (row[-1] for row in fit_page(odd).sections[0].tables[0].rows if row[0] == "mass of the head")
+    assert re.fullmatch(r"known, expected 0\.10\skg to 0\.30\skg", remark)
+
+
+def test_too_little_data_says_what_cannot_be_had(static_only):
+    """Static loading of the large actuator alone determines its curve and its area, and nothing else."""
+    found = identify(static_only)
     assert set(found.intervals) == {"body_area_N_psi"}
     needs = {missing.name: missing.needs for missing in found.open}
     assert "step_response of the large" in needs["body_alpha_n_per_s"]
@@ -153,7 +173,7 @@ def test_too_little_data_says_what_cannot_be_had(lab):
     assert "balance" in needs["head_mass_kg"]
     assert "static_loading of the small" in needs["small stiffness curve"]
     assert any("mu_s, mu_k. What would determine it: anchor_pull" in line for line in remarks(found))
-    again = identify(Dataset(path=None, name="static only", known={}, trials=trials))
+    again = identify(static_only)
     assert again.model.values == found.model.values
 
 

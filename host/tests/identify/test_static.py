@@ -10,6 +10,9 @@ from numpy.polynomial import chebyshev
 from scipy.signal import savgol_filter
 
 from bifa.data import Dataset
+from bifa.errors import BifaError
+from bifa.identify.doubts import assumed_curves
+from bifa.identify.start import prepare
 from bifa.identify.static import fit_static
 from bifa.problem.motion import imposed_motion, moving_line
 from bifa.problem.stiffness import UndeterminedError, fit_stiffness
@@ -147,3 +150,32 @@ def test_the_shipped_curve_and_the_fitted_one_are_the_same_form():
     curve = StiffnessCurve(tuple(chebyshev.cheb2poly(fit.coefficients)), fit.lower_m, fit.upper_m)
     x = np.linspace(fit.lower_m, fit.upper_m, 300)
     assert curve.force(x) == pytest.approx(fit.force(x), abs=1e-8)
+
+
+def with_forces(day: Dataset, factor: float) -> Dataset:
+    columns = [t.columns | {"force_N": factor * t.columns["force_N"]} for t in day.trials]
+    return replace(day, trials=tuple(replace(t, columns=c) for t, c in zip(day.trials, columns, strict=True)))
+
+
+@pytest.mark.parametrize(
+    ("factor", "known", "told"),
+    [
+        (-1.0, {}, r"static loadings of the small actuator .* small_area_N_psi = -3.* force_N.* in dataset\.toml"),
+        (1e3, {}, r"static loadings of the small actuator .* small_area_N_psi = 3\d{3}.* 0\.5 to 10 N/psi"),
+        (1.0, {"head_mass_kg": 175.0}, r"\[known\] in dataset\.toml: head_mass_kg = 175\.0 .* 0\.02 to 1 kg"),
+    ],
+)
+def test_what_no_robot_has_is_told_with_the_place_where_it_stands(factor, known, told):
+    day = bench(IndependentLab().with_seed(5), "small", pressures=(0.0, 8.0), repeats=2)
+    with pytest.raises(BifaError, match=told):
+        prepare(replace(with_forces(day, factor), known=known))
+
+
+@pytest.mark.parametrize(
+    ("measured", "assumed"),
+    [(("small", (0.0, 8.0)), []), (("small", (8.0,)), ["small"]), (("large", (4.0, 8.0)), ["large"])],
+)
+def test_a_curve_that_is_needed_but_not_determined_is_told(measured, assumed):
+    day = bench(IndependentLab().with_seed(5), *measured, repeats=2)
+    told = assumed_curves(prepare(day))
+    assert [line.partition(" actuator")[0].rpartition(" ")[2] for line in told] == assumed

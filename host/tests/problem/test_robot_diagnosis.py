@@ -9,11 +9,14 @@ import sys
 from datetime import date
 
 import pytest
+from typer.testing import CliRunner
 
-from bifa.data import read_dataset
+from bifa.cli import app
+from bifa.data import read_dataset, write_dataset
 from bifa.identify.completed import completed_model
 from bifa.identify.start import prepare
 from bifa.robot import load_model
+from harness.independent_lab import IndependentLab
 from lacuna.diagnosis.diagnose import diagnose
 from virtual_robot.sealed import generate
 
@@ -46,6 +49,20 @@ def test_the_command_finds_nothing_in_a_robot_without_an_effect(tmp_path):
     assert completed.effects == {}
     assert completed.name == read_dataset(folder).name
     assert completed.provenance.startswith(f"bifa diagnose on {date.today():%Y-%m-%d}: fitted to 45 trials of")
+
+
+def test_a_curve_that_no_trial_determines_and_repeats_that_differ_are_told_with_the_verdict(tmp_path):
+    lab = IndependentLab().with_seed(11)
+    pulls = [lab.anchor(psi, repeat=repeat) for repeat in (1, 2) for psi in (0.0, 4.0, 8.5)]
+    for pull in pulls[3:]:
+        pull.columns["pressure_psi"][:] += 0.5  # from the second repeat on the sensor has an offset
+    folder, record = write_dataset(tmp_path / "day", lab.day("pulls", pulls)), tmp_path / "found.json"
+    result = CliRunner().invoke(app, ["diagnose", str(folder), "--json", str(record)])
+    told = "There is no static_loading of the small actuator at 0 psi"
+    curve, repeats, *_ = json.loads(record.read_text())["warnings"]
+    assert curve.startswith(told)
+    assert repeats.startswith("Repeats of anchor_pull differ by 0.3")
+    assert told.replace("_", " ") in result.output
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 from scipy import optimize
 
 from bifa import effects, robot, simulate
+from bifa.data import layout as data_layout
 from bifa.effects import EffectError, EffectParameter, PhysicalEffect, choked_flow
+from bifa.effects.effect import EXPERIMENTS
 from bifa.simulate import hooks, layout
 from bifa.simulate.paper import FAST
 from bifa.simulate.records import as_stamped
@@ -25,7 +27,6 @@ NAMED = {
     "choked_flow", "leak", "supply_sag", "regulator_ripple", "sensor_lag", "sensor_position", "sensor_calibration",
     "stribeck", "friction_direction", "inclination", "tether_drag",
 }  # fmt: skip
-EXPERIMENTS = ("static_loading", "step_response", "anchor_pull", "locomotion")
 LEAST_VISIBLE = {"force_N": 0.02, "displacement_mm": 0.02, "displacement_head_mm": 0.02}  # pressures: 0.005 psi
 # A pull at one speed shows little of how friction falls with speed; all other effects show clearly.
 FAINT = {("stribeck", "anchor_pull")}
@@ -205,6 +206,15 @@ def test_an_effect_that_remembers_without_a_state_is_refused(with_new_effect, ho
         with_new_effect(**{hook: lambda share: share})
 
 
+def test_a_state_that_nothing_changes_is_refused(with_new_effect, monkeypatch):
+    with_new_effect(area=lambda share: share)
+    library = effects.library()
+    library["swelling"] = replace(library["swelling"], states=1)
+    monkeypatch.setattr(effects, "library", lambda: library)
+    with pytest.raises(EffectError, match="swelling declares states=1, but its state never changes: define line or"):
+        hooks.chain_source()
+
+
 def test_an_effect_without_a_hook_is_refused(with_new_effect):
     with pytest.raises(EffectError, match="swelling does not act"):
         with_new_effect()
@@ -240,6 +250,30 @@ def test_a_file_that_is_no_effect_of_its_name_is_refused(file, declared, told, m
     monkeypatch.setattr(effects, "modules", lambda: {file: module})
     with pytest.raises(EffectError, match=told):
         effects.library.__wrapped__()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"experiments": ("walk",)}, r"swelling: no experiment is walk; there are .*locomotion"),
+        ({"states": 2}, r"swelling: states = 2, but an effect has 1 state"),
+        ({"parameters": (replace(_SIZE, lower=0.1),)}, r"swelling\.share is a size, 0 .* 0\.1 to 1"),
+    ],
+)
+def test_a_declaration_that_would_keep_an_effect_from_being_tried_is_refused(wrong, told):
+    right = {"experiments": EXPERIMENTS, "parameters": (_SIZE,)}
+    with pytest.raises(EffectError, match=told):
+        PhysicalEffect("swelling", "", "F (1 + share)", "a test", "eq. (2)", **right | wrong)
+
+
+def test_effects_name_the_experiments_of_data_sets():
+    assert set(EXPERIMENTS) == set(data_layout.EXPERIMENTS)
+
+
+def test_a_tuple_of_one_needs_no_comma():
+    effect = PhysicalEffect("swelling", "", "F (1 + share)", "a test", "eq. (2)", "locomotion", _SIZE)
+    assert effect.experiments == ("locomotion",)
+    assert effect.sizes == (_SIZE,)
 
 
 PAGE = Path(__file__).parents[3] / "docs" / "adding-an-effect.md"

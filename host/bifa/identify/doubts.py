@@ -1,0 +1,52 @@
+"""Reasons to doubt what is fitted to a data set: curves that were not measured, and repeats that are none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bifa.data import Trial
+from bifa.identify.start import ACTUATORS
+from bifa.problem.inputs import WALK
+from bifa.problem.system import RobotSystem
+from lacuna.check.numbers import fast_noise
+from lacuna.estimation.fit import Fit
+
+_MAX_REPEAT_RATIO = 5.0  # differences between repeats, over the fast noise; healthy: below 3, if noise is colored
+
+
+def assumed_curves(system: RobotSystem) -> tuple[str, ...]:
+    """A sentence for each actuator whose stiffness curve the trials need but do not determine."""
+    felt = {actuator for trial in system.dataset.trials for actuator in _felt(trial)}
+    return tuple(
+        f"There is no static_loading of the {actuator} actuator at 0 psi, so its stiffness curve is that of the model "
+        f"{system.model.name!r}: where this robot's curve differs, the difference may be taken for an effect, or for "
+        "something that no effect explains."
+        for actuator, prefix in ACTUATORS.items()
+        if prefix not in system.curves and actuator in felt
+    )
+
+
+def _felt(trial: Trial) -> tuple[str, ...]:
+    """The actuators whose stiffness curves a trial depends on."""
+    if trial.experiment == WALK:
+        return tuple(ACTUATORS)
+    return (trial.actuator or "small",)  # a pull tests a head
+
+
+def repeats_apart(fit: Fit) -> Iterator[str]:
+    """Sentences on channels whose repeats differ by far more than their fast noise: an odd repeat, or an instrument
+    that changed, raises the noise floor, so that the errors look small."""
+    for (experiment, channel), noise in fit.problem.floor.channels.items():
+        trials = [t for t in fit.problem.trials if t.experiment == experiment and channel in t.channels]
+        if not noise.repeats or not trials:
+            continue
+        fast = float(np.median([fast_noise(t.time_s, t.channels[channel]) for t in trials]))
+        ratio = noise.sd / max(fast, fit.structure.system.sensor_noise(experiment, channel))
+        if ratio > _MAX_REPEAT_RATIO:
+            yield (
+                f"Repeats of {experiment} differ by {noise.sd:.2g} {channel.rpartition('_')[2]} in {channel}, "
+                f"{ratio:.0f} times as much as neighboring samples do, and all of that counts as noise: was one "
+                "recorded differently, or did an instrument change? `bifa check --pictures` plots them."
+            )
