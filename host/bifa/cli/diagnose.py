@@ -74,7 +74,6 @@ def diagnose(
     """Fit the base model, find what its residuals have in common across repeats, name the cause, and add it to the
     model. Reports the error before and after on held-out trials. The exit status is 0 for any verdict."""
     from contextlib import nullcontext
-    from dataclasses import replace
 
     from bifa.files import check_targets, named
     from bifa.rig import check_port, is_offered
@@ -109,7 +108,7 @@ def diagnose(
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
     with console.status("starting"):
-        from bifa.identify.doubts import assumed_curves, repeats_apart
+        from bifa.identify.doubts import with_doubts
         from bifa.identify.start import prepare
         from bifa.report.words import spoken
         from lacuna.diagnosis import diagnose as engine
@@ -127,7 +126,7 @@ def diagnose(
             found = engine.diagnose(
                 system, seed=seed, suspected=suspected, on_progress=report_progress, executor=executor
             )
-            return replace(found, warnings=(*assumed_curves(system), *repeats_apart(found.base), *found.warnings))
+            return with_doubts(found, system)
 
         with workers as (executor, _):
             found = run_diagnosis(measured)

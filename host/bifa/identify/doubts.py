@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +12,15 @@ from bifa.identify.start import ACTUATORS
 from bifa.problem.inputs import WALK
 from bifa.problem.system import RobotSystem
 from lacuna.check.numbers import fast_noise
+from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.estimation.fit import Fit
 
 _MAX_REPEAT_RATIO = 5.0  # differences between repeats, over the fast noise; healthy: below 3, if noise is colored
+
+
+def with_doubts(found: Diagnosis, system: RobotSystem) -> Diagnosis:
+    """Return the diagnosis with these reasons before its warnings."""
+    return replace(found, warnings=(*assumed_curves(system), *repeats_apart(found.base), *found.warnings))
 
 
 def assumed_curves(system: RobotSystem) -> tuple[str, ...]:

@@ -67,6 +67,7 @@ def diagnosing(monkeypatch, tmp_path):
     monkeypatch.setattr(
         "lacuna.diagnosis.diagnose.diagnose", lambda *_, **__: done.append("diagnosed") or "the verdict"
     )
+    monkeypatch.setattr("bifa.identify.doubts.with_doubts", lambda found, system: found)
     monkeypatch.setattr("lacuna.diagnosis.record.as_record", str)
     monkeypatch.setattr("bifa.cli.diagnose.print_diagnosis", lambda console, record, labels: done.append(record))
     return lambda *options: (CliRunner().invoke(app, ["diagnose", str(tmp_path), *options]).exception, done)
