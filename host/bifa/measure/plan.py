@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from bifa.data import Trial
-from bifa.data.layout import GAIT_OPTIONAL
+from bifa.data import Trial, layout
 from bifa.link.units import set_point_psi
 from bifa.robot.gait import BASELINE, Gait, GaitFile
 
-EXPERIMENTS = ("static_loading", "step_response", "anchor_pull", "locomotion")
+EXPERIMENTS = tuple(layout.EXPERIMENTS)
 ACTUATORS = ("large", "small")
 REPEATS, CYCLES = 3, 5
 QUICK_REPEATS, QUICK_CYCLES = 2, 3
@@ -69,7 +68,7 @@ class PlannedTrial:
 
     def as_trial(self, columns: Mapping[str, Any] | None = None, **fields: Any) -> Trial:
         """Return the `Trial` that this becomes once recorded."""
-        with_gait = {key: self.parameters[key] for key in GAIT_OPTIONAL if key in self.parameters}
+        with_gait = {key: self.parameters[key] for key in layout.GAIT_OPTIONAL if key in self.parameters}
         return Trial(
             file=self.file,
             experiment=self.experiment,

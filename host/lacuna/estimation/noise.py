@@ -91,7 +91,10 @@ class NoiseFloor:
     def sd(self, trial: Record, channel: str) -> np.ndarray:
         """Standard deviation of each sample of a trial, shape (n,); larger where the record moves fast, and where the
         reading is large if the noise grows with it."""
-        noise, samples = self.of(trial.experiment, channel), _smooth(trial.channels[channel])
+        noise = self.of(trial.experiment, channel)
+        if not (noise.jitter_s or noise.grows):
+            return np.full(trial.time_s.shape, noise.sd)
+        samples = _smooth(trial.channels[channel])
         sd = noise.sd_at(samples)
         return np.sqrt(sd**2 + _shift_variance(trial.time_s, samples, noise.jitter_s, sd)) if noise.jitter_s else sd
 
@@ -202,9 +205,10 @@ def _with_jitter(
     jitter_s, scaled, likelihood = _jitter(records, differences, moving, sds), [], 0.0
     for record, difference, sd in zip(records, differences, sds, strict=True):
         total = np.sqrt(sd**2 + _shift_variance(*record, jitter_s, sd)) if jitter_s else sd
-        scaled.append(resample_evenly(record[0], difference / total))
-        known = np.isfinite(difference)
-        likelihood -= float(np.sum(np.log(total[known]) + np.abs(difference / total)[known] / _MEAN_DEVIATION))
+        z = difference / total
+        scaled.append(resample_evenly(record[0], z))
+        known = np.isfinite(z)
+        likelihood -= float(np.sum(np.log(total[known]) + np.abs(z[known]) / _MEAN_DEVIATION))
     return replace(noise, jitter_s=float(jitter_s), samples_per_piece=correlation_samples(scaled)), likelihood
 
 
