@@ -97,6 +97,7 @@ class CommandTable:
     reports: tuple[Message, ...]
     results: tuple[tuple[str, str], ...]
     words: dict[str, list[str]]
+    fault_units: dict[str, tuple[str, int]]
 
 
 @dataclass(frozen=True)
@@ -185,7 +186,10 @@ def command_table() -> CommandTable:
         raise ValueError(f"no report is named {', '.join(sorted(unknown))}")
     results = tuple((row["name"], row["text"]) for row in raw["result"])
     version = tuple(int(part) for part in raw["firmware_version"].split("."))
-    return CommandTable(raw["protocol_version"], version, commands, reports, results, raw["words"])
+    units = {fault: (unit, scale) for fault, (unit, scale) in raw["fault_units"].items()}
+    if unknown := units.keys() - set(raw["words"]["Fault"]):
+        raise ValueError(f"no fault is named {', '.join(sorted(unknown))}")
+    return CommandTable(raw["protocol_version"], version, commands, reports, results, raw["words"], units)
 
 
 def table_hash(parameters: ParameterTable, commands: CommandTable) -> int:

@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks import parts, stack_bound
-from harness.chip import FIRMWARE, connected
+from harness.chip import FIRMWARE, Line, connected
 from virtual_robot.uno import CLOCK_HZ
 from virtual_robot.uno import Uno as Board
 
@@ -76,7 +76,7 @@ def cycles_of(source: str, seconds: float, *definitions: str) -> tuple[int, floa
 def strobe_jitter() -> int:
     """Peak-to-peak jitter of the strobe's rising edges, in cycles, about 10 ms, walking, streaming and uploading."""
     board = board_at_rest()
-    uno = connected(board)
+    uno = connected(Line(board))
     uno.run()
     uno.stream(True)
     first = board.event_count
@@ -96,7 +96,7 @@ def strobe_jitter() -> int:
 def sleep_fraction(frames: bool, text: bool) -> float:
     """Share of time that the chip sleeps while it walks and sends a frame, a line of text, or both per sample."""
     board = board_at_rest()
-    uno = connected(board)
+    uno = connected(Line(board))
     uno.run()
     if frames:
         uno.stream(True)
@@ -126,7 +126,7 @@ def stack_free() -> int:
         stimulate(board, 1.0)
     board.send(b"plot off\n")
     stimulate(board, 0.1)
-    uno = connected(board)
+    uno = connected(Line(board))
     uno.upload({"period_s": 3.0}, save="bench")
     uno.run()
     uno.stream(True)

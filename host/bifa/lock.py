@@ -38,7 +38,13 @@ def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
     file = _acquire(path, folder)
     try:
         file.truncate(0)
-        file.write(json.dumps(_who(), indent=1) + "\n")
+        who = {
+            "pid": os.getpid(),
+            "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+            "host": socket.gethostname(),
+            "since": datetime.now().isoformat(sep=" ", timespec="seconds"),
+        }
+        file.write(json.dumps(who, indent=1) + "\n")
         file.flush()
         yield
     finally:
@@ -50,46 +56,23 @@ def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
 def _acquire(path: Path, folder: Path) -> IO[str]:
     """Open the lock file and lock it."""
     while True:
+        file = None
         try:
             file = path.open("a+", encoding="utf-8")
-            is_held = _hold(file)
-        except OSError as error:
-            raise LockedError(
-                f"{path} cannot be written and locked ({error.strerror or error}); choose another folder"
-            ) from None
-        if not is_held:
-            file.seek(0)
-            text = file.read()
-            file.close()
-            raise LockedError(
-                f"{folder} is being written by {_describe_holder(text)}: wait for it, or choose another folder"
-            )
+            _lock(file)
+        except OSError as error:  # on some network drives nothing can be locked
+            why = f"{path} cannot be written and locked ({error.strerror or error}); choose another folder"
+            if file is not None:
+                if error.errno in _TAKEN:
+                    file.seek(0)
+                    holder = _describe_holder(file.read())
+                    why = f"{folder} is being written by {holder}: wait for it, or choose another folder"
+                file.close()
+            raise LockedError(why) from None
         with suppress(OSError):
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 return file
         file.close()  # the previous holder has just removed this file: try again with the current one
-
-
-def _hold(file: IO[str]) -> bool:
-    """Try to lock `file`; returns whether that succeeded. Raises OSError where nothing can be locked, as on some
-    network drives."""
-    try:
-        _lock(file)
-    except OSError as error:
-        if error.errno not in _TAKEN:
-            file.close()
-            raise
-        return False
-    return True
-
-
-def _who() -> dict[str, object]:
-    return {
-        "pid": os.getpid(),
-        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
-        "host": socket.gethostname(),
-        "since": datetime.now().isoformat(sep=" ", timespec="seconds"),
-    }
 
 
 def _describe_holder(text: str) -> str:

@@ -2,17 +2,15 @@
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rich.console
+from rich.progress import TextColumn
 from rich.segment import Segment
+from rich.status import Status
 from rich.text import Text
 
 from bifa.printable import printable
-
-if TYPE_CHECKING:
-    from rich.progress import TextColumn
-    from rich.status import Status
 
 
 class Console(rich.console.Console):
@@ -27,7 +25,7 @@ class Console(rich.console.Console):
         for segment in super().render(*args, **kwargs):
             yield segment if segment.control else Segment(printable(segment.text), segment.style)
 
-    def status(self, status: Any, **options: Any) -> "Status":
+    def status(self, status: Any, **options: Any) -> Status:
         """See rich.console.Console, whose own status would interpret markup."""
         return super().status(Text(status) if isinstance(status, str) else status, **options)
 
@@ -60,10 +58,8 @@ class Countdown:
         self._status, self._what = None, ""
 
 
-def words(template: str, **options: Any) -> "TextColumn":
+def words(template: str, **options: Any) -> TextColumn:
     """Return a text column for a progress bar that does not interpret markup."""
-    from rich.progress import TextColumn  # most commands show no bar
-
     return TextColumn(template, markup=False, **options)
 
 

@@ -11,7 +11,7 @@ ffi, lib = load(
     Board* board_new(void); void board_free(Board*); void board_reset(Board*);
     void board_send(Board*, const uint8_t*, size_t); void board_run(Board*, uint32_t ms, int until_output);
     size_t board_receive(Board*, uint8_t*, size_t); uint32_t board_now_ms(Board*);
-    uint8_t board_valves(Board*); uint8_t board_state(Board*); void board_eeprom(Board*, uint8_t*);
+    uint8_t board_valves(Board*); uint8_t board_state(Board*);
     """,
 )
 STATES = ("idle", "running", "holding", "stopped", "fault")

@@ -113,5 +113,4 @@ size_t board_receive(Board* board, uint8_t* data, size_t size) {
 uint32_t board_now_ms(Board* board) { return board->now_ms; }
 uint8_t board_valves(Board* board) { return board->valves; }
 uint8_t board_state(Board* board) { return static_cast<uint8_t>(board->program->controller.state()); }
-void board_eeprom(Board* board, uint8_t* image) { memcpy(image, board->cells, sizeof board->cells); }
 }

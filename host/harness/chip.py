@@ -42,9 +42,8 @@ class Line:
         self.uno.run_for(duration_s)
 
 
-def connected(uno: Uno) -> link.Uno:
-    """The host's end of the link to `uno`, connected."""
-    line = Line(uno)
+def connected(line: Line) -> link.Uno:
+    """The host's end of the link, connected."""
     host = link.Uno(line, line, seed=1)
     host.connect()
     return host

@@ -7,8 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+
+from bifa.data.export import Export, parse_exports
+from bifa.data.fields import Fields, Source
+from bifa.toml import parse_toml
 
 Columns = Mapping[str, np.ndarray]
 
@@ -185,3 +190,16 @@ MACHINES = (*(name for name in EXPORTS if name not in CAMERAS), "labview", "ardu
 def preset_of(name: str) -> str:
     """The preset that reads an export of this name."""
     return name.split(",")[0]
+
+
+def write_export(folder: Path, name: str, columns: Columns) -> Path:
+    """The file `trial` in the folder, as the program called `name` exports the columns."""
+    path = folder / f"trial{EXPORTS[name].suffix}"
+    path.write_bytes(EXPORTS[name].write(columns))
+    return path
+
+
+def declarations(text: str, file: str = "bench.toml") -> dict[str, Export]:
+    """The exports that a bench file of this text declares, by role."""
+    source, tables = Source(text, 0, file), parse_toml(text).get("instrument", {})
+    return parse_exports(Fields(tables if isinstance(tables, dict) else {}, source, table="instrument"), source)

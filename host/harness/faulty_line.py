@@ -11,7 +11,6 @@ class FaultyLine:
         self._random = random.Random(seed)
         self.rate = rate
         self.faults = 0
-        self.bytes = 0
 
     def write(self, data: bytes) -> None:
         self._transport.write(self._damage(data))
@@ -19,15 +18,11 @@ class FaultyLine:
     def read(self, timeout_s: float) -> bytes:
         return self._damage(self._transport.read(timeout_s))
 
-    def reset(self) -> None:
-        self._transport.reset()
-
     def close(self) -> None:
         self._transport.close()
 
     def _damage(self, data: bytes) -> bytes:
         out, burst = bytearray(), 0
-        self.bytes += len(data)
         for byte in data:
             hit = burst > 0 or self._random.random() < self.rate
             burst = max(0, burst - 1)

@@ -86,6 +86,23 @@ class IndependentLab:
             out[i] = self.color * out[i - 1] + np.sqrt(1 - self.color**2) * white[i]
         return sd * out[50:]
 
+    @property
+    def truth(self) -> dict[str, float]:
+        """The values of the parameters that experiments determine, under the model's names."""
+        return {
+            "body_damping_Ns_m": self.large.damping,
+            "body_area_N_psi": self.large.area,
+            "body_alpha_n_per_s": self.large.fast,
+            "body_alpha_s_per_s": self.large.slow,
+            "small_damping_Ns_m": self.small.damping,
+            "small_area_N_psi": self.small.area,
+            "small_alpha_n_per_s": self.small.fast,
+            "small_alpha_s_per_s": self.small.slow,
+            "wall_offset_m": self.wall_offset,
+            "mu_s": self.mu_s,
+            "mu_k": self.mu_k,
+        }
+
     def sensor(self, pressure: np.ndarray) -> np.ndarray:
         """Readings after noise and a converter with 0.0366 psi per count."""
         noisy = pressure + self.noise(len(pressure), self.pressure_noise)

@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+from contextlib import closing
 
 from harness.pty_uno import PtyUno
 from harness.waiting import until
@@ -16,8 +17,7 @@ class WebMonitor:
 
     def __init__(self, *options, port=None, uno=None):
         self.uno = uno or (PtyUno() if port is None else None)
-        command = [sys.executable, "-m", "bifa", "monitor", "--web"]
-        command += ["--port", port or self.uno.device]
+        command = [sys.executable, "-m", "bifa", "monitor", "--web", "--port", port or self.uno.device]
         command += [] if "--web-port" in options else ["--web-port", "0"]
         environment = os.environ | {"PYTHONUNBUFFERED": "1"}
         self.process = subprocess.Popen(
@@ -30,11 +30,8 @@ class WebMonitor:
 
     def gait(self):
         """The parameters that the Uno has."""
-        watcher = WebSocket(self.port)
-        try:
+        with closing(WebSocket(self.port)) as watcher:
             return watcher.until(lambda state: "parameters" in state)["parameters"]
-        finally:
-            watcher.close()
 
     def until(self, state, timeout_s=10.0):
         """Whether the board reaches this state in time."""

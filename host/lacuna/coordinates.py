@@ -62,8 +62,7 @@ class Coordinate:
         return low, high
 
     def _end(self, bound: float, value: float) -> float:
-        """Convert an end of a range. The inverse of 0, or of a bound on the other side of it, is infinite, with the
-        sign of the value."""
+        """Convert an end of a range. The inverse of 0, or of a bound beyond it, is infinite, with the value's sign."""
         return self.fitted(math.copysign(0.0, value) if self is INVERSE and bound * value <= 0 else bound)
 
 
@@ -97,8 +96,7 @@ LOG = Coordinate(_log, _exp, _inverse)
 
 
 def of_parameter(p: Parameter, ordered: bool = False) -> Coordinate:
-    """Coordinate of a parameter of the base model or one that shapes an effect. `ordered`: another parameter limits it
-    or is limited by it."""
+    """Coordinate of a base parameter or one that shapes an effect. `ordered`: another one limits it or vice versa."""
     return LOG if p.lower > 0.0 and not ordered else PLAIN
 
 

@@ -28,6 +28,7 @@ from lacuna.system import (
     System,
     Theta,
     middle_conditions,
+    no_prediction,
     several,
 )
 from lacuna.values import Values
@@ -299,7 +300,7 @@ class FunctionSystem(System):
         try:
             return self.run(trial, self.values(theta, corrections))
         except (ArithmeticError, np.linalg.LinAlgError):  # the parameters are too extreme to simulate
-            return _failed(trial)
+            return no_prediction(trial)
 
     def predict_trials(
         self,
@@ -323,7 +324,7 @@ class FunctionSystem(System):
         try:
             found = self.predict(theta, effects, trial, corrections=corrections)
         except ValueError:
-            return _failed(trial)
+            return no_prediction(trial)
         except LacunaError:
             raise
         except Exception as error:
@@ -336,7 +337,7 @@ class FunctionSystem(System):
             name in found and found[name].shape == column.shape and found[name].dtype.kind in "fiu"
             for name, column in trial.channels.items()
         )
-        return found if alike else _failed(trial)
+        return found if alike else no_prediction(trial)
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         given = self._nuisances
@@ -389,8 +390,7 @@ class FunctionSystem(System):
 
 
 def _call_for_trial(what: str, trial: Record, ask: Callable[[], Any]) -> Any:
-    """Call a user's function for a trial. Raises MisuseError if it fails, DeclarationError if what it declares is
-    wrong."""
+    """Call a user's function for a trial. Raises MisuseError if it fails, DeclarationError if it declares wrongly."""
     try:
         return ask()
     except DeclarationError as error:
@@ -441,13 +441,8 @@ def _library(effects: Iterable[Effect] | Effect) -> tuple[Effect, ...]:
     return several(effects, Effect)
 
 
-def _failed(trial: Record) -> Channels:
-    return {name: np.full(column.shape, np.nan) for name, column in trial.channels.items()}
-
-
 def _check_names(names: Sequence[str], what: str) -> None:
-    """Raise DeclarationError if a name cannot be reached as `theta.NAME`, is reserved for learnt curves, or is used
-    twice."""
+    """Raise DeclarationError if a name is no `theta.NAME`, is reserved for learnt curves, or is used twice."""
     for name in names:
         if "." in name or name == LEARNT or hasattr(Values, name):
             raise DeclarationError(f"{what} {name!r}: choose another name, without a dot; this one is reserved.")
@@ -455,8 +450,7 @@ def _check_names(names: Sequence[str], what: str) -> None:
 
 
 def _check_amounts(what: str, told: Any, by_output: bool) -> None:
-    """Raise DeclarationError unless `told` is None or maps outputs to non-negative numbers; unless `by_output`, a
-    single number or a word is accepted, too."""
+    """Raise DeclarationError unless `told` maps outputs to amounts or, unless `by_output`, is one amount or a word."""
     if told is None or (isinstance(told, str) and not by_output):
         return
     if not isinstance(told, Mapping):

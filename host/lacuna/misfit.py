@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from lacuna.diagnosis.diagnose import Diagnosis
-from lacuna.estimation.fit import evaluate_on
+from lacuna.estimation.fit import evaluate_on, rms_by_channel
 from lacuna.estimation.problem import SOFT_LIMIT
 from lacuna.estimation.sampling import correlation_samples, resample_evenly, sample_period
 from lacuna.function_system import FunctionSystem
@@ -54,13 +54,7 @@ def compare_at_misfit(
 
 def residual_rms(found: Diagnosis) -> dict[Key, float]:
     """RMS residual of the final explanation on its fitted trials, in the channels' units."""
-    squares: dict[Key, list[float]] = {}
-    residuals = found.final.residuals()
-    for trial in found.final.problem.trials:
-        for channel, residual in residuals[trial.name].items():
-            if (known := residual[np.isfinite(residual)]).size:
-                squares.setdefault((trial.experiment, channel), []).append(float(np.mean(known**2)))
-    return {key: float(np.sqrt(np.mean(values))) for key, values in squares.items()}
+    return rms_by_channel(found.final.problem.trials, found.final.residuals().values())
 
 
 def _mean_log(one: dict[Key, float], other: dict[Key, float]) -> float:

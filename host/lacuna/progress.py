@@ -19,8 +19,7 @@ def most_steps(effects: int) -> int:
 
 
 class Progress:
-    """Progress callback, called with a description of each step as it begins. The total is an upper bound, and so is
-    the time left: many searches end sooner."""
+    """Progress callback, called with each step as it begins. Total and time left are upper bounds."""
 
     def __init__(self, effects: int, stream: TextIO | None = None):
         self._total, self._stream = most_steps(effects), stream or sys.stderr

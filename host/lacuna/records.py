@@ -45,8 +45,8 @@ class Table:
     clock: str = ""
 
     def record(self, outputs: Sequence[str]) -> Record:
-        """Return a `Record` with `outputs` as channels and all other columns as inputs. Raises RecordError if an output
-        is missing."""
+        """Return a `Record` with `outputs` as channels and all other columns as inputs; that of a segment has the run
+        that it is a stretch of. Raises RecordError if an output is missing."""
         for output in outputs:
             if output not in self.columns:
                 raise RecordError(
@@ -62,7 +62,14 @@ class Table:
             session_order=_whole(self.labels.get("order"), self.name),
             inputs={name: column for name, column in self.columns.items() if name not in outputs},
             clock=self.clock,
+            payload=self._run(outputs),
         )
+
+    def _run(self, outputs: Sequence[str]) -> Stretch | None:
+        if "stretch" not in self.labels:
+            return None
+        whole, first, last = self.labels["stretch"]
+        return Stretch(_cut(whole, slice(last), whole.name, {}).record(outputs), int(first))
 
 
 def read(data: Any) -> list[Record | Table]:
@@ -185,8 +192,7 @@ def _of_series(column: Any) -> np.ndarray:
 
 
 def _own(column: Any, record: str, name: str) -> Any:
-    """Return an input as the model gets it: samples as numbers, a single value or a function unchanged, the words true
-    and false as 1 and 0."""
+    """Return an input as the model gets it: samples and truths as numbers, a value or a function unchanged."""
     if callable(column):
         return column
     if np.ndim(column) == 0:
@@ -195,8 +201,7 @@ def _own(column: Any, record: str, name: str) -> Any:
 
 
 def _samples(column: Any, record: str, name: str) -> np.ndarray:
-    """Return a column as numbers in a new array, so that a model that writes into it cannot change the user's data.
-    Raises RecordError."""
+    """Return a column as numbers in a new array, so that no model changes the user's data. Raises RecordError."""
     if isinstance(column, np.ma.MaskedArray):
         masked: Any = column.astype(float if column.dtype.kind in "fiub" else object)
         column = masked.filled(np.nan)
@@ -265,17 +270,13 @@ def _folder(folder: Path) -> list[Record | Table]:
         return [_csv(folder)]
     if not folder.exists():
         raise RecordError(f"{folder}: no such folder.")
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".csv" and _is_listed(file))
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".csv" and file.is_file())
+    files = [file for file in files if not file.name.startswith((".", "~$"))]  # left behind by a system or a program
     if not files:
         raise RecordError(f"{folder} holds no CSV files.")
     tables = {file.stem: _csv(file) for file in files}
     _refuse_settings({stem: table for stem, table in tables.items() if table.labels["condition"] == _stem(stem)[0]})
     return list(tables.values())
-
-
-def _is_listed(file: Path) -> bool:
-    """Whether to read a file: not if an operating system or office program left it behind (._x.csv, ~$x.csv)."""
-    return file.is_file() and not file.name.startswith((".", "~$"))
 
 
 def _stem(stem: str) -> tuple[str, int | None]:
@@ -408,8 +409,7 @@ def _names_in_remark(remarks: Sequence[list[str]], cells: list[str], file: Path,
 
 
 def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) -> np.ndarray:
-    """Convert a column's cells to numbers: NaN if empty, 1 and 0 for true and false. Labels may be text. Raises
-    RecordError for any other text."""
+    """Convert a column's cells to numbers (NaN if empty). Raises RecordError for text, except in labels."""
     values = [_of_cell(cell) for cell in cells]
     if None not in values:
         return np.array(values)
@@ -478,9 +478,8 @@ def windows(
         phase = round(start % period, 9) if period else place
         phase = 0.0 if period and period - phase < 0.5 * sample else phase
         name = _part(table, f"window {place + 1}")
-        labels = {**table.labels, "condition": f"from {phase:g} s" if period else name, "order": place}
-        columns = {n: c[at] if _along(c, table) else c for n, c in table.columns.items()}
-        found.append(replace(table, name=name, time_s=time[at] - time[at][0], columns=columns, labels=labels))
+        window = _cut(table, at, name, {"condition": f"from {phase:g} s" if period else name, "order": place})
+        found.append(replace(window, time_s=time[at] - time[at][0]))
     return found
 
 
@@ -497,9 +496,8 @@ def segments(data: Any, count: int = 10) -> list[Table]:
     found = []
     for place, (first, last) in enumerate(pairwise(ends)):
         name = _part(table, f"segment {place + 1}")
-        labels = {**table.labels, "condition": name, "order": place, "stretch": (table, first, last)}
-        columns = {n: c[first:last] if _along(c, table) else c for n, c in table.columns.items()}
-        found.append(replace(table, name=name, time_s=table.time_s[first:last], columns=columns, labels=labels))
+        labels = {"condition": name, "order": place, "stretch": (table, first, last)}
+        found.append(_cut(table, slice(first, last), name, labels))
     return found
 
 
@@ -513,23 +511,14 @@ def describe_reversal(time_s: np.ndarray) -> str:
 
 
 def _part(table: Table, name: str) -> str:
-    """Return the name of a part of a record, prefixed by the record's own if it has one, so that parts of several
-    records can be used together."""
+    """Return the name of a part of a record, after the record's own if any, so that parts of several are told apart."""
     return f"{table.labels['name']}, {name}" if "name" in table.labels else name
 
 
-def attach_run(table: Table, record: Record, outputs: Sequence[str]) -> Record:
-    """Attach to `record` the run that it is a stretch of, if `table` is a segment; otherwise return it unchanged."""
-    if "stretch" not in table.labels:
-        return record
-    whole, first, last = table.labels["stretch"]
-    columns = {n: c[:last] if _along(c, whole) else c for n, c in whole.columns.items()}
-    run = replace(whole, time_s=whole.time_s[:last], columns=columns).record(outputs)
-    return replace(record, payload=Stretch(run, int(first)))
-
-
-def _along(column: Any, table: Table) -> bool:
-    return np.shape(column)[:1] == table.time_s.shape
+def _cut(table: Table, at: slice, name: str, labels: Mapping[str, Any]) -> Table:
+    """Return the samples `at` of a table, with these labels besides its own."""
+    along = {n: c[at] if np.shape(c)[:1] == table.time_s.shape else c for n, c in table.columns.items()}
+    return replace(table, name=name, time_s=table.time_s[at], columns=along, labels={**table.labels, **labels})
 
 
 def _one_long(data: Any) -> Table:

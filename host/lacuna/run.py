@@ -24,7 +24,7 @@ from lacuna.estimation.problem import usable_cores, use_threads
 from lacuna.function_system import FunctionSystem
 from lacuna.misfit import compare_at_misfit, residual_correlation_s, residual_rms
 from lacuna.progress import Progress
-from lacuna.records import Table, attach_run, read
+from lacuna.records import Table, read
 from lacuna.system import Record, System, several
 from lacuna.verdict import Verdict
 
@@ -149,19 +149,17 @@ def _detect_grains(system: System) -> tuple[System, list[str]]:
         grains = grains_of(system, system.trials)
     except LacunaError:  # an error of the model, which the check reports more clearly
         return system, []
-    said = [
-        f"{name} changes predictions only in steps, of about {_user_width(system, name, width):.2g}: let the model"
-        " interpolate between them, and it is fitted better."
-        for name, width in grains.items()
-    ]
+    values = {p.name: p.value for p in system.parameters}
+    for effect in system.effects.values():
+        values |= effect.typical
+    said = []
+    for name, width in grains.items():
+        steps = abs(system.told(name, values[name] + width) - system.told(name, values[name]))
+        said.append(
+            f"{name} changes predictions only in steps, of about {steps:.2g}: let the model interpolate between them,"
+            " and it is fitted better."
+        )
     return system.with_grains(grains), said
-
-
-def _user_width(system: FunctionSystem, name: str, width: float) -> float:
-    effect, _, own = name.rpartition(".")
-    parameters = system.effects[effect].parameters if effect else system.parameters
-    (value,) = (p.value for p in parameters if p.name == own)
-    return abs(system.told(name, value + width) - system.told(name, value))
 
 
 def _with_test(system: System, names: tuple[str, ...]) -> System:
@@ -230,8 +228,7 @@ def _with_residual_warnings(
 
 
 def _white(found: Diagnosis, left_s: Mapping[str, float]) -> dict[str, float]:
-    """RMS residual of the channels in which something is left that neither has a correlation time nor depends on
-    anything."""
+    """RMS residual of the channels in which something is left that has no correlation time and depends on nothing."""
     dependent = {d.channel for d in found.left.signature.dependences}
     left = residual_rms(found)
     keys = [key for key in found.left.remainder.found if left_s.get(key[1]) == 0.0 and key[1] not in dependent]
@@ -247,13 +244,13 @@ def with_records(system: System, records: Any) -> FunctionSystem:
     given = read(records)
     tables = [one for one in given if isinstance(one, Table)]
     outputs = system.outputs or (_outputs(system, tables[0]) if tables else ())
-    trials = [one if isinstance(one, Record) else attach_run(one, one.record(outputs), outputs) for one in given]
+    trials = [one if isinstance(one, Record) else one.record(outputs) for one in given]
     return system.with_trials(trials)
 
 
 def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
     """Find the names of the outputs by calling `simulate` on one record. Raises MisuseError."""
-    record = attach_run(table, table.record(()), ())
+    record = table.record(())
     run = record.payload.run if record.payload else record
     theta = {p.name: p.value for p in (*system.parameters, *system.nuisances(record))}
     try:

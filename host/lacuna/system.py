@@ -106,8 +106,7 @@ def _is_number(given: Any) -> bool:
 
 
 def several(given: Any, kind: type) -> tuple[Any, ...]:
-    """Return `given`, one object of type `kind` or an iterable of them, as a tuple. Raises DeclarationError if any is
-    of another type."""
+    """Return `given`, one of `kind` or an iterable of them, as a tuple. Raises DeclarationError for anything else."""
     found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, kind) else (given,)
     for one in found:
         if not isinstance(one, kind):
@@ -224,6 +223,11 @@ class Record:
 
     def __repr__(self) -> str:
         return f"Record({self.name!r}, {len(self.time_s)} samples of {', '.join(self.channels)})"
+
+
+def no_prediction(trial: Record) -> Channels:
+    """The channels of a trial whose simulation failed: NaN throughout."""
+    return {name: np.full(column.shape, np.nan) for name, column in trial.channels.items()}
 
 
 def groups_of_repeats(trials: Sequence[Record]) -> list[list[Record]]:

@@ -16,7 +16,7 @@ from lacuna.errors import LacunaError, MisuseError
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.structure import is_learnt
 from lacuna.function_system import FunctionSystem
-from lacuna.records import attach_run, read
+from lacuna.records import read
 from lacuna.system import Record, System
 from lacuna.values import Values
 
@@ -60,8 +60,7 @@ class CompletedModel:
             raise MisuseError(f"the model finds no {error.args[0]}.") from error
 
     def _expected(self, record: Any, given: Mapping[str, float]) -> dict[str, float]:
-        """The nuisances' expected values, which may depend on an output that a new record lacks; empty if all are
-        `given`."""
+        """The nuisances' expected values, which may depend on an output that a record lacks; {} if all are `given`."""
         if self._nuisances <= given.keys():
             return {}
         try:
@@ -82,7 +81,7 @@ def _one(record: Any, outputs: tuple[str, ...]) -> Record:
     found = given[0]
     if isinstance(found, Record):
         return found
-    return attach_run(found, found.record([name for name in outputs if name in found.columns]), outputs)
+    return found.record([name for name in outputs if name in found.columns])
 
 
 class Verdict:
@@ -107,7 +106,9 @@ class Verdict:
         fitted = diagnosis.told if isinstance(system, FunctionSystem) else diagnosis.final
         self.model = CompletedModel(system, fitted)
         self.theta = self.model.theta
-        self.nuisances = _nuisances(fitted)
+        problem, point = fitted.problem, fitted.solution.point
+        nuisances = {t.name: problem.named(i, point.nuisances[i]) for i, t in enumerate(problem.trials)}
+        self.nuisances = {name: values for name, values in nuisances.items() if values}
         self.record = as_record(self.diagnosis)
         self.error = {side: getattr(diagnosis, side).held_out for side in ("before", "after", "floor")}
 
@@ -206,12 +207,6 @@ def _frame(record: Mapping[str, Any], theta: Mapping[str, float], what: str) -> 
         for ends in [known.get(name, (math.nan, math.nan))]
     ]
     return pandas.DataFrame(rows, columns=["parameter", "value", "lower_90", "upper_90"]).set_index("parameter")
-
-
-def _nuisances(fitted: Fit) -> dict[str, dict[str, float]]:
-    problem, point = fitted.problem, fitted.solution.point
-    found = {t.name: problem.named(i, point.nuisances[i]) for i, t in enumerate(problem.trials)}
-    return {name: nuisances for name, nuisances in found.items() if nuisances}
 
 
 def told(system: System, diagnosis: Diagnosis) -> Diagnosis:

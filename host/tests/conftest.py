@@ -5,6 +5,7 @@ import random
 import signal
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack, closing
 from functools import partial
 
 import pytest
@@ -41,6 +42,31 @@ def signals_as_in_a_terminal():
     yield numbers
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture
+def closes():
+    """closes(one): return it, and close it after the test."""
+    with ExitStack() as stack:
+        yield lambda one: stack.enter_context(closing(one))
+
+
+@pytest.fixture
+def board():
+    """The Uno's own code on this computer, as transport and clock."""
+    from harness.board import Board
+
+    return Board()
+
+
+@pytest.fixture
+def connected(board):
+    """The host's end of the link to the board, connected."""
+    from bifa.link import Uno
+
+    uno = Uno(board, board, seed=1)
+    uno.connect()
+    return uno
 
 
 @pytest.fixture

@@ -1,17 +1,31 @@
-"""Files are written whole or not at all, and output paths are checked before any work."""
+"""Files are written whole or not at all, output paths are checked before any work, and only regular files are read: a
+pipe may never end, and a device has no end."""
 
 import errno
 import os
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from bifa.cli import app
+from bifa.data import DatasetError, read_dataset, write_dataset
 from bifa.files import TargetError, check_targets, write_text, written, written_into
+from bifa.measure.bench_file import BenchFileError, read_bench
+from bifa.measure.propose import look
+from bifa.robot import load_model
+from bifa.robot.gait import GaitError, read_gait_file
+from bifa.robot.model_file import ModelFileError
+from harness.data_sets import make_dataset
+
+needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+FULL_DISK = OSError(errno.ENOSPC, "No space left on device")
 
 
-def full_disk(path: Path) -> None:
+def half(path: Path, error: BaseException = FULL_DISK) -> None:
+    """Write half of a file, and fail."""
     path.write_text("half of it", encoding="utf-8")
-    raise OSError(errno.ENOSPC, "No space left on device")
+    raise error
 
 
 def test_a_full_disk_leaves_the_old_file_and_nothing_beside_it(tmp_path):
@@ -21,7 +35,7 @@ def test_a_full_disk_leaves_the_old_file_and_nothing_beside_it(tmp_path):
         pytest.raises(TargetError, match=r"model\.toml cannot be written \(No space left on device\)"),
         written(target) as a,
     ):
-        full_disk(a)
+        half(a)
     assert target.read_text() == "old\n"
     assert list(tmp_path.iterdir()) == [target]
 
@@ -33,15 +47,11 @@ def test_the_file_beside_has_the_same_suffix_so_that_writers_know_the_format(tmp
 
 
 def test_an_error_or_ctrl_c_leaves_nothing_half_written(tmp_path):
-    def fail(path: Path, error: type) -> None:
-        path.write_text("half", encoding="utf-8")
-        raise error
-
-    for error in (ValueError, KeyboardInterrupt):
-        with pytest.raises(error), written(tmp_path / "a.csv") as aside:
-            fail(aside, error)
-        with pytest.raises(error), written_into(tmp_path / "pictures") as aside:
-            fail(aside / "1.png", error)
+    for error in (ValueError(), KeyboardInterrupt()):
+        with pytest.raises(type(error)), written(tmp_path / "a.csv") as aside:
+            half(aside, error)
+        with pytest.raises(type(error)), written_into(tmp_path / "pictures") as aside:
+            half(aside / "1.png", error)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -59,7 +69,7 @@ def test_pictures_come_together_and_others_in_the_folder_stay(tmp_path):
         "2.png": "new",
     }
     with pytest.raises(TargetError, match="No space"), written_into(folder) as aside:
-        full_disk(aside / "3.png")
+        half(aside / "3.png")
     assert not (folder / "3.png").exists()
 
 
@@ -74,7 +84,7 @@ def test_targets_are_refused_before_work(tmp_path):
         check_targets(folders=(tmp_path / "file" / "pictures",))
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@needs_pipes
 @pytest.mark.parametrize("is_link", [False, True])
 def test_a_pipe_or_a_device_is_not_replaced_by_a_file(tmp_path, is_link):
     os.mkfifo(target := tmp_path / "pipe")
@@ -107,3 +117,41 @@ def test_a_folder_that_refuses_files_is_known_before_the_work():
         check_targets(Path("/proc/x.toml"))
     with pytest.raises(TargetError, match=r"/proc/x cannot be written"):
         check_targets(folders=(Path("/proc/x"),))
+
+
+def a_pipe(path):
+    os.mkfifo(path)
+
+
+def a_device(path):
+    path.symlink_to("/dev/zero")
+
+
+@needs_pipes
+@pytest.mark.parametrize("put", [a_pipe, a_device])
+def test_neither_a_pipe_nor_a_device_is_read(tmp_path, put):
+    reads = ((load_model, ModelFileError), (read_gait_file, GaitError), (read_bench, BenchFileError))
+    for name, read, error in (*(("x.toml", *one) for one in reads), ("pull.csv", look, DatasetError)):
+        put(tmp_path / name)
+        with pytest.raises(error, match="not a regular file"):
+            read(tmp_path / name)
+        (tmp_path / name).unlink()
+
+
+@needs_pipes
+@pytest.mark.parametrize("put", [a_pipe, a_device])
+@pytest.mark.parametrize("name", ["dataset.toml", "locomotion_1.csv"])
+def test_a_data_set_consists_of_files(tmp_path, put, name):
+    write_dataset(tmp_path / "day", make_dataset(1))
+    (tmp_path / "day" / name).unlink()
+    put(tmp_path / "day" / name)
+    with pytest.raises(DatasetError, match=r"not a regular file|cannot be read|no such file|outside"):
+        read_dataset(tmp_path / "day")
+
+
+@needs_pipes
+def test_the_command_says_so(tmp_path):
+    a_pipe(tmp_path / "gait.toml")
+    result = CliRunner().invoke(app, ["upload", str(tmp_path / "gait.toml"), "--port", "/dev/null"])
+    assert result.exit_code != 0
+    assert "not a regular file" in result.output + str(result.exception)

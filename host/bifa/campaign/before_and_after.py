@@ -13,7 +13,6 @@ from bifa.problem.accuracy import QUANTITIES, is_of
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.residual_error import repeat_differences, rms
 from lacuna.estimation.fit import evaluate_on
-from lacuna.system import Channels
 
 _POINTS = 400  # points per trace, enough for a small figure
 
@@ -32,14 +31,13 @@ def prediction_errors(found: Diagnosis) -> list[dict[str, Any]]:
                 "after": [after[trial.name] for trial in trials],
                 "noise_floor": floor,
             }
-            errors = {side: rms(_only(quantity, channels) for channels in members) for side, members in sides.items()}
+            errors = {
+                side: rms({n: r for n, r in channels.items() if is_of(n, quantity)} for channels in members)
+                for side, members in sides.items()
+            }
             if math.isfinite(errors["before"]):  # the quantity was measured in these trials
                 rows.append({"quantity": quantity, "trials": which} | {k: float(f"{v:.4g}") for k, v in errors.items()})
     return rows
-
-
-def _only(quantity: str, channels: Channels) -> Channels:
-    return {name: residual for name, residual in channels.items() if is_of(name, quantity)}
 
 
 def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict[str, Any]]:

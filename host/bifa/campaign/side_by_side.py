@@ -6,6 +6,7 @@ import json
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -86,24 +87,19 @@ def _read(name: str, folder: Path) -> Campaign:
 
 def compare_page(runs: Sequence[Campaign]) -> Page:
     """Build the page that compares the campaigns."""
+    verdicts = [f"{run.name}: {_verdict(run)}" for run in runs]
+    gaits = [gait_table(runs, which) for which in runs[0].gaits]
+    marks = (
+        "Parameters of the completed models; ≠ marks those that differ between two runs by more than their "
+        "uncertainties allow."
+    )
     return Page(
         f"{len(runs)} campaigns side by side",
         _lead(runs),
         [
-            ChartedSection(
-                "Verdicts", [f"{run.name}: {_verdict(run)}" for run in runs], [error_table(runs)], [_errors(runs)]
-            ),
-            ChartedSection(
-                "Gaits", tables=[gait_table(runs, which) for which in runs[0].gaits], charts=[_speeds(runs)]
-            ),
-            ChartedSection(
-                "Models",
-                [
-                    "Parameters of the completed models; ≠ marks those that differ between two runs by more than "
-                    "their uncertainties allow."
-                ],
-                [parameter_table(runs)],
-            ),
+            ChartedSection("Verdicts", verdicts, [error_table(runs)], [_errors(runs)]),
+            ChartedSection("Gaits", tables=gaits, charts=[_speeds(runs)]),
+            ChartedSection("Models", [marks], [parameter_table(runs)]),
         ],
         (f"{BASE_MODEL} {COMPLETED_MODEL} {RMS} {NOISE_FLOOR} {HELD_OUT}",),
         (verdict_table(runs), speed_table(runs)),
@@ -183,9 +179,7 @@ def parameter_table(runs: Sequence[Campaign]) -> PageTable:
 
 def _differ(parameters: Sequence[ModelParameter]) -> bool:
     sure = [(p.value, p.sd) for p in parameters if p.sd]
-    return any(
-        abs(a - b) > _APART * np.hypot(sd_a, sd_b) for i, (a, sd_a) in enumerate(sure) for b, sd_b in sure[i + 1 :]
-    )
+    return any(abs(a - b) > _APART * np.hypot(sd_a, sd_b) for (a, sd_a), (b, sd_b) in combinations(sure, 2))
 
 
 def gait_table(runs: Sequence[Campaign], which: str) -> PageTable:

@@ -144,8 +144,7 @@ def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict[st
 
 
 def _request(folder: Path, stage: Stage) -> dict[str, Any]:
-    missing = [name for name in stage.needs if not (folder / name).exists()]
-    if missing:
+    if missing := _missing(folder, stage.needs):
         raise StageError(f"stage {stage.name} needs {', '.join(missing)} in {folder}: run the earlier stages first")
     return {
         "version": bifa.__version__,
@@ -159,10 +158,9 @@ def _is_current(folder: Path, stage: Stage, request: dict[str, Any], record: dic
         return False
     made = record.get("artefacts", {})
     other = [n for n in stage.makes if not (folder / n).exists() or made.get(n) != digest(folder / n)]
-    intact = not other
     if not stage.by_hand:
-        return intact and all(record.get(key) == value for key, value in request.items())
-    if intact and (differing := _differing(record.get("settings", {}), request["settings"])):
+        return not other and all(record.get(key) == value for key, value in request.items())
+    if not other and (differing := _differing(record.get("settings", {}), request["settings"])):
         raise StageError(
             f"{', '.join(stage.makes)} in {folder} was measured with {', '.join(differing)}: use the same "
             f"settings, choose another folder, or measure again with --rerun {stage.name}"
@@ -173,7 +171,7 @@ def _is_current(folder: Path, stage: Stage, request: dict[str, Any], record: dic
             f"{', '.join(other)} in {folder} is not what the stage {stage.name} measured (a file has changed or is "
             f"missing): restore it, or measure again with --rerun {stage.name}"
         )
-    return intact and same_inputs
+    return not other and same_inputs
 
 
 def _differing(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
@@ -218,7 +216,10 @@ def _resumed(scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, 
     were all moved."""
     if not stage.resumes or not scratch.exists():
         return {}
-    begun = _read_request(scratch)
+    # empty after an earlier version or an interruption at the very start
+    begun = _read_json(
+        scratch / _REQUEST_FILE, "delete it to resume with the settings of now, if they are the original ones"
+    )
     moved = "artefacts" in begun and not any((scratch / name).exists() for name in stage.makes)
     if moved or not (stage.by_hand or {key: begun.get(key) for key in request} == request):
         shutil.rmtree(scratch)
@@ -234,19 +235,6 @@ def _resumed(scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, 
             "settings, or choose another folder for a new campaign (both are then kept)"
         )
     return begun
-
-
-def _read_request(scratch: Path) -> dict[str, Any]:
-    """What the scratch folder was started with; empty after an earlier version or an interruption at the very start."""
-    path = scratch / _REQUEST_FILE
-    try:
-        return dict(json.loads(path.read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        return {}
-    except (ValueError, TypeError) as error:
-        raise StageError(
-            f"{path} is damaged ({error}): delete it to resume with the settings of now, if they are the original ones"
-        ) from None
 
 
 def trials_in(scratch: Path) -> int:
@@ -266,46 +254,46 @@ def _leftover_digests(folder: Path, scratch: Path, stage: Stage, begun: Mapping[
 def _make(folder: Path, scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, str]:
     """Run the stage, unless an interrupted run has made all artefacts; return their digests."""
     _write_json(scratch / _REQUEST_FILE, request)
-    if _missing(scratch, stage):
+    if _missing(scratch, stage.makes):
         stage.run(folder, scratch)
-    if missing := _missing(scratch, stage):
+    if missing := _missing(scratch, stage.makes):
         raise StageError(f"stage {stage.name} ended without making {', '.join(missing)}")
     made = {name: digest(scratch / name) for name in stage.makes}
     _write_json(scratch / _REQUEST_FILE, request | {"artefacts": made})
     return made
 
 
-def _missing(scratch: Path, stage: Stage) -> list[str]:
-    return [name for name in stage.makes if not (scratch / name).exists()]
+def _missing(folder: Path, names: Iterable[str]) -> list[str]:
+    return [name for name in names if not (folder / name).exists()]
 
 
 def _replace(new: Path, target: Path, keep: bool) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
-    if keep and target.exists():
-        os.replace(target, _backup_path(target))
+    if keep and target.exists():  # under a name numbered one above the highest, even if lower numbers are missing
+        there = target.parent.glob(f"{glob.escape(target.name)}.earlier-*")
+        numbers = [path.name.rpartition("-")[2] for path in there]
+        last = max((int(number) for number in numbers if number.isdecimal()), default=0)
+        os.replace(target, target.with_name(f"{target.name}.earlier-{last + 1}"))
     if target.is_dir():
         shutil.rmtree(target)
     os.replace(new, target)
 
 
-def _backup_path(target: Path) -> Path:
-    """Name under which `target` is kept: numbered one above the highest, even if lower numbers are missing."""
-    there = target.parent.glob(f"{glob.escape(target.name)}.earlier-*")
-    numbers = [path.name.rpartition("-")[2] for path in there]
-    last = max((int(number) for number in numbers if number.isdecimal()), default=0)
-    return target.with_name(f"{target.name}.earlier-{last + 1}")
-
-
 def _read_records(folder: Path) -> dict[str, Any]:
+    def records(content: Any) -> dict[str, Any]:
+        return {name: dict(record) for name, record in dict(content["stages"]).items()}
+
+    return _read_json(folder / PROVENANCE, "repair it, or choose another folder to start over", records)
+
+
+def _read_json(path: Path, remedy: str, parse: Callable[[Any], dict[str, Any]] = dict) -> dict[str, Any]:
+    """Return what is in the file, empty if it does not exist. Raises StageError, with the remedy, if it is damaged."""
     try:
-        stages = json.loads((folder / PROVENANCE).read_text())["stages"]
-        return {name: dict(record) for name, record in dict(stages).items()}
+        return parse(json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         return {}
     except (ValueError, KeyError, TypeError) as error:
-        raise StageError(
-            f"{folder / PROVENANCE} is damaged ({error}): repair it, or choose another folder to start over"
-        ) from None
+        raise StageError(f"{path} is damaged ({error}): {remedy}") from None
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

@@ -54,19 +54,19 @@ def _run(robot: str, made: Sequence[tuple[str, str]], inputs: Path, outputs: Pat
         "completed": datasets["completed"].trials,
     }
     results = [_result(name, trials, base, completed) for name, trials in walked.items()]
-    if edge := _edge(inputs):
-        results.append(_result("edge", edge, base, load_model(inputs / "model-last.toml")))
-    diagnosis = json.loads((inputs / "diagnosis.json").read_text())
-    traces = json.loads((inputs / "residuals.json").read_text())
+    rounds = read_rounds(inputs / "rounds.json")
+    if rounds[-1]["at_edge"]:
+        last = read_dataset(inputs / "rounds" / f"walks-{len(rounds)}")
+        results.append(_result("edge", last.trials, base, load_model(inputs / "model-last.toml")))
+    diagnosis, traces, errors = (
+        json.loads((inputs / f"{name}.json").read_text()) for name in ("diagnosis", "residuals", "errors")
+    )
     truth = json.loads((inputs / "truth.json").read_text()) if (inputs / "truth.json").exists() else None
     summary = {
         "gaits": results,
-        "verdict": diagnosis["verdict"],
-        "effects": diagnosis["effects"],
-        "remainder": diagnosis["remainder"],
-        "error": diagnosis["error"],
-        "prediction_error": json.loads((inputs / "errors.json").read_text()),
-        "rounds": read_rounds(inputs / "rounds.json"),
+        **{name: diagnosis[name] for name in ("verdict", "effects", "remainder", "error")},
+        "prediction_error": errors,
+        "rounds": rounds,
         "robustness": _robustness(completed, {name: Gait(**trials[0].walked) for name, trials in walked.items()}),
         "truth": truth,
     }
@@ -83,23 +83,10 @@ def _run(robot: str, made: Sequence[tuple[str, str]], inputs: Path, outputs: Pat
     draw_chart(errors_chart(diagnosis["error"]), outputs / "errors.png")
     (outputs / "walk.svg").write_text(motion_of(most_missed(walks), standalone=True)[0], encoding="utf-8")
     measured = read_dataset(inputs / "bench")
-    page = campaign_page(
-        summary,
-        diagnosis,
-        traces,
-        walks,
-        labels_of(measured),
-        robot,
-        [*_measurement_info(measured), *made, _versions()],
-    )
+    versions = "versions", f"bifa {bifa.__version__}, Python {platform.python_version()}, NumPy {np.__version__}"
+    about = [*_measurement_info(measured), *made, versions]
+    page = campaign_page(summary, diagnosis, traces, walks, labels_of(measured), robot, about)
     write_page(page, outputs / "report.html")
-
-
-def _edge(inputs: Path) -> Sequence[Trial]:
-    """Walks of the last round, if its gait was sought at the edge of what is known."""
-    rounds = read_rounds(inputs / "rounds.json")
-    last = inputs / "rounds" / f"walks-{len(rounds)}"
-    return read_dataset(last).trials if rounds[-1]["at_edge"] and last.exists() else []
 
 
 def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -> dict[str, Any]:
@@ -128,10 +115,6 @@ def _measurement_info(measured: Dataset) -> list[tuple[str, str]]:
     day = datetime.fromtimestamp((measured.folder / "dataset.toml").stat().st_mtime).date().isoformat()
     firmware = measured.provenance.get("firmware")
     return [("measured", day), *([("firmware", str(firmware))] if firmware else [])]
-
-
-def _versions() -> tuple[str, str]:
-    return "versions", f"bifa {bifa.__version__}, Python {platform.python_version()}, NumPy {np.__version__}"
 
 
 def _robustness(model: Model, gaits: Mapping[str, Gait]) -> dict[str, list[float]]:

@@ -1,6 +1,6 @@
 """Walk gaits on a rig and compare the measurements with the model's predictions."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from bifa.campaign.stages import OnProgress
-from bifa.data import Dataset, Trial
+from bifa.data import Dataset, DatasetWriter, Trial
 from bifa.gait.prediction import Prediction, predict_speed, settles
 from bifa.gait.settling import MAX_CYCLES, MIN_CYCLES, MeasuredSpeed, Walking, complete_cycles, measured_speed
 from bifa.gait.uncertainty import spread_of
 from bifa.link import Uno
-from bifa.measure.plan import PlannedTrial, walks
+from bifa.measure.experiments import Progress
+from bifa.measure.plan import Turn, walks
 from bifa.measure.session import Recorder, run_session, unattended
 from bifa.problem.switches import seconds_per_uno_s, valves_of
 from bifa.rig import Rig
@@ -53,14 +54,13 @@ def measure_walks(
     )
 
 
-def _until_settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
+def _until_settled(rig: Rig, uno: Uno, turn: Turn, on_progress: Progress, writer: DatasetWriter) -> Trial:
     """`Recorder` of an unattended rig: repeat the walk for longer until it has settled or lasts `MAX_CYCLES`."""
     while True:
-        trial = unattended(rig, uno, planned, on_progress)
-        short = planned.cycles < MIN_CYCLES
-        if short or planned.cycles >= MAX_CYCLES or speed_of(trial).walking is not Walking.UNSETTLED:
+        trial, cycles = unattended(rig, uno, turn, on_progress, writer), turn.planned.cycles
+        if not MIN_CYCLES <= cycles < MAX_CYCLES or speed_of(trial).walking is not Walking.UNSETTLED:
             return trial
-        planned = replace(planned, cycles=min(2 * planned.cycles, MAX_CYCLES))
+        turn = replace(turn, planned=replace(turn.planned, cycles=min(2 * cycles, MAX_CYCLES)))
 
 
 def planned_cycles(model: Model, gait: Gait, least: int) -> int:

@@ -52,13 +52,10 @@ def merge_findings(findings: Sequence[Finding]) -> Iterator[MergedFinding]:
             yield from (MergedFinding(finding.kind, str(finding)) for finding in group)
             continue
         column = f", {group[0].column}" if group[0].column else ""
-        text = f"{_count(group)}{column}: {_merge_texts([finding.text for finding in group])}"
+        count = len({finding.file or finding.condition for finding in group})
+        what = f"{count} {'trials' if group[0].file else 'conditions'}{column}"
+        text = f"{what}: {_merge_texts([finding.text for finding in group])}"
         yield MergedFinding(group[0].kind, text, tuple(finding.place for finding in group))
-
-
-def _count(group: Sequence[Finding]) -> str:
-    places = {finding.file or finding.condition for finding in group}
-    return f"{len(places)} {'trials' if group[0].file else 'conditions'}"
 
 
 def _merge_texts(texts: Sequence[str]) -> str:

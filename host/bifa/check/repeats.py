@@ -142,7 +142,9 @@ def _curves(trial: Trial) -> dict[str, list[Curve]]:
         mm, force_N = columns["displacement_mm"], columns["force_N"]
         turn = int(np.argmax(mm))
         return {"force_N": [_sorted(mm[part], force_N[part]) for part in (slice(turn + 1), slice(turn, None))]}
-    time_s = trial.time_s - trial.time_s[_first_switch(trial)]
+    switches = [np.flatnonzero(np.diff(values)) for name, values in columns.items() if is_command(name)]
+    first = int(min((rows[0] for rows in switches if rows.size), default=0))
+    time_s = trial.time_s - trial.time_s[first]
     found = {name: values for name, values in columns.items() if name.startswith("pressure")}
     if trial.experiment == "step_response":
         found["displacement_mm"] = columns["displacement_mm"]
@@ -154,11 +156,6 @@ def _curves(trial: Trial) -> dict[str, list[Curve]]:
 def _sorted(at: np.ndarray, values: np.ndarray) -> Curve:
     order = np.argsort(at, kind="stable")
     return at[order], values[order]
-
-
-def _first_switch(trial: Trial) -> int:
-    switches = [np.flatnonzero(np.diff(values)) for name, values in trial.columns.items() if is_command(name)]
-    return int(min((rows[0] for rows in switches if rows.size), default=0))
 
 
 def _unit(channel: str) -> str:

@@ -65,9 +65,8 @@ for _module in sorted(module.name for module in pkgutil.iter_modules(__path__) i
     app.command(epilog="\n\n".join(("Examples:", *_file.EXAMPLES)))(getattr(_file, _module))
 for _command in app.registered_commands:  # paragraphs fill the terminal, wherever the docstring breaks its lines
     _command.help = re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.getdoc(_command.callback) or "")
-    _command.short_help = re.split(r"(?<=\.)\s", _command.help)[
-        0
-    ]  # the whole sentence; typer truncates at 45 characters
+    # the whole sentence; typer truncates at 45 characters
+    _command.short_help = re.split(r"(?<=\.)\s", _command.help)[0]
 
 
 def main() -> None:

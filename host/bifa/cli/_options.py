@@ -66,6 +66,7 @@ def file_option(text: str) -> Any:
     return typer.Option(help=text, exists=True, dir_okay=False)
 
 
+OUT = typer.Option(help="Folder for all artefacts; name it again to resume.")
 DATASET = typer.Argument(help="The data set's folder.", show_default=False, exists=True, file_okay=False)
 PORT = port_option()
 KNOWN = typer.Option(
@@ -80,6 +81,8 @@ BENCH = file_option(f"File that declares the formats of your instruments (bifa i
 QUICK = typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
 PROFILE = typer.Option(help="Profile of the virtual robot; ideal: the paper's equations with white noise.")
 PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
+REPORT = typer.Option(help="Write a self-contained HTML report.")
+BASE_MODEL = file_option("Base model to start from (default: the nominal one).")
 
 
 def requires(needed: str, **options: object) -> None:

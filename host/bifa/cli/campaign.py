@@ -1,13 +1,19 @@
 """`bifa campaign`: measure, fit, find what is missing, optimise, walk, compare."""
 
+import json
+from contextlib import closing
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.text import Text
 
 from bifa.cli._options import (
     BENCH_FILE,
     KNOWN,
+    OUT,
     PROFILE,
     QUICK,
     RERUN,
@@ -18,12 +24,14 @@ from bifa.cli._options import (
     stoppable,
 )
 from bifa.computer import EXAMPLE_PORT
+from bifa.errors import BifaError
+from bifa.files import check_targets
 from bifa.printable import counted
+from bifa.screen import Console, Countdown
 
 if TYPE_CHECKING:
     from bifa.measure.by_hand import ByHand
     from bifa.measure.desk import Desk
-    from bifa.screen import Console
 
 
 EXAMPLES = (
@@ -39,9 +47,7 @@ _PROFILE: Profile = "realistic"
 
 
 def campaign(
-    out: Annotated[Path, typer.Option(help="Folder for all artefacts; name it again to resume.")] = Path(
-        "out/campaign"
-    ),
+    out: Annotated[Path, OUT] = Path("out/campaign"),
     port: Annotated[str, port_option("`virtual`, a serial port, or the name of your own rig.")] = "virtual",
     seed: Annotated[
         int,
@@ -74,7 +80,6 @@ def campaign(
     A virtual robot declares its masses and its supply pressure.
     """
     from bifa.campaign.stages import check_folder
-    from bifa.files import check_targets
     from bifa.rig import check_port, is_offered
 
     check_targets(folders=(out,))
@@ -85,12 +90,8 @@ def campaign(
     if is_offered(port):
         requires("a serial port", watch=watch)
 
-    from contextlib import closing
-    from dataclasses import replace
-
     from bifa.campaign.setup import Effort, Setup
     from bifa.measure.bench_file import load_or_ask_known, parse_known
-    from bifa.screen import Console
 
     console = Console()
     options = {"sealed": seed, "profile": profile} if port == "virtual" else {}
@@ -113,11 +114,7 @@ def campaign(
     _print_summary(console, out)
 
 
-def _print_summary(console: "Console", out: Path) -> None:
-    import json
-
-    from rich.text import Text
-
+def _print_summary(console: Console, out: Path) -> None:
     from bifa.campaign.page import prediction_table, speed_table
     from bifa.report.diagnosis import noise_table
     from bifa.report.terminal import plain_spaces, print_lines, print_table
@@ -125,14 +122,13 @@ def _print_summary(console: "Console", out: Path) -> None:
 
     summary = json.loads((out / "summary.json").read_text())
     effects = "; ".join(effect_words(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
-    verdict = Text.assemble("verdict: ", (summary["verdict"], "bold"), f", {plain_spaces(effects)}")
-    console.print(verdict)
+    console.print(Text.assemble("verdict: ", (summary["verdict"], "bold"), f", {plain_spaces(effects)}"))
     if summary["truth"] is not None:
         inside = "; ".join(effect_words(name, values) for name, values in summary["truth"].items())
         print_lines(console, [f"the seal opened: {inside or 'nothing'}"])
-    errors = prediction_table(summary["prediction_error"]), noise_table(summary["error"])
-    for table in (*errors, speed_table(summary["gaits"])):
-        print_table(console, table)
+    print_table(console, prediction_table(summary["prediction_error"]))
+    print_table(console, noise_table(summary["error"]))
+    print_table(console, speed_table(summary["gaits"]))
     for number, one in enumerate(summary["rounds"], 1):
         console.print(
             f"round {number}, a gait that was not fitted{', at the edge' if one['at_edge'] else ''}: "
@@ -143,15 +139,11 @@ def _print_summary(console: "Console", out: Path) -> None:
     console.print(f"report: {out / 'report.html'}", soft_wrap=True)
 
 
-def at_desk(console: "Console", watch: Path | None, bench: Path) -> "tuple[Desk, ByHand]":
+def at_desk(console: Console, watch: Path | None, bench: Path) -> "tuple[Desk, ByHand]":
     """Return the desk on this terminal, and the recorder for instruments worked by hand (`bifa.measure.by_hand`)."""
-    from functools import partial
-
-    from bifa.errors import BifaError
     from bifa.measure.bench_file import read_exports
     from bifa.measure.by_hand import ByHand
     from bifa.measure.desk import Desk
-    from bifa.screen import Countdown
 
     if watch is not None and not watch.is_dir():
         raise BifaError(f"--watch: the folder {watch} does not exist; create it, and set the instruments to save there")
@@ -164,8 +156,6 @@ def at_desk(console: "Console", watch: Path | None, bench: Path) -> "tuple[Desk,
 
 def kept_on_disk(out: Path) -> str:
     """Describe what an interrupted campaign has left on disk."""
-    import json
-
     from bifa.campaign.stages import PROVENANCE, trials_in
 
     try:

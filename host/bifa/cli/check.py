@@ -1,18 +1,19 @@
 """`bifa check`: list what is in a data set, plot it, and warn of what looks wrong."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bifa.cli._options import DATASET, PICTURES
+from bifa.files import check_targets, written_into
+from bifa.printable import counted
+from bifa.screen import Console, warning
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from bifa.check import Finding
     from bifa.data import Dataset
-    from bifa.screen import Console
 
 
 EXAMPLES = ("bifa check bench-2026-11-21", "bifa check bench-2026-11-21 --pictures out/pictures")
@@ -29,13 +30,10 @@ def check(
     well-formed but doubtful (a clipped sensor, a clock that jumps, missing repeats) and likely mistakes (a reversed
     sign, swapped tubes, the gait of another walk, a mass in grams) are listed as warnings, with status 0.
     """
-    from bifa.files import check_targets, written_into
-
     check_targets(folders=(pictures,))
 
     from bifa.check import check_dataset
     from bifa.data import read_dataset
-    from bifa.screen import Console
 
     console = Console()
     with console.status("reading"):
@@ -46,7 +44,6 @@ def check(
     if not findings:
         console.print("Nothing looks wrong.")
     if pictures is not None:
-        from bifa.printable import counted
         from bifa.report.datasets import plot_dataset
 
         with console.status("drawing"), written_into(pictures) as aside:
@@ -56,16 +53,15 @@ def check(
         raise typer.Exit(1)
 
 
-def warn_of_findings(console: "Console", dataset: "Dataset") -> None:
+def warn_of_findings(console: Console, dataset: "Dataset") -> None:
     """Warn of likely mistakes, which would upset a fit or be mistaken for an effect."""
     from bifa.check.plausibility import check_plausibility
 
     _print_findings(console, check_plausibility(dataset))
 
 
-def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
+def _print_findings(console: Console, findings: "Sequence[Finding]") -> None:
     from bifa.check.finding import merge_findings
-    from bifa.screen import warning
 
     for found in merge_findings(findings):
         console.print(warning(f"[{found.kind}] {found.text}"))
@@ -73,9 +69,8 @@ def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
             console.print(f"  {'; '.join(found.places)}")
 
 
-def _print_contents(console: "Console", dataset: "Dataset") -> None:
+def _print_contents(console: Console, dataset: "Dataset") -> None:
     from bifa.data.dataset import conditions_of
-    from bifa.printable import counted
     from bifa.report.page import PageTable
     from bifa.report.terminal import print_lines, print_table
     from bifa.report.words import parameter_words, quantity

@@ -1,6 +1,8 @@
 """`bifa console`: the Uno's text console with history, completion and a status line."""
 
+import queue
 import sys
+import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,6 +10,8 @@ import typer
 
 from bifa.cli._options import PORT
 from bifa.computer import EXAMPLE_PORT
+from bifa.errors import BifaError
+from bifa.screen import Console
 
 if TYPE_CHECKING:
     from bifa.link import Uno
@@ -24,15 +28,12 @@ def console(port: Annotated[str | None, PORT] = None) -> None:
 
     Piped input is sent line by line; the answers are printed, and the exit status is 1 if any was an error.
     """
-    from bifa.errors import BifaError
-
     if sys.stdin is None:
         raise BifaError("stdin is closed; run it in a terminal, or pipe lines into it")
 
     from bifa.link import Uno
     from bifa.link.terminal import settle
     from bifa.rig import open_rig
-    from bifa.screen import Console
 
     typed = sys.stdin.isatty()
     with open_rig(port) as rig:
@@ -52,9 +53,6 @@ def console(port: Annotated[str | None, PORT] = None) -> None:
 
 def piped_lines(uno: "Uno") -> Iterator[str]:
     """Yield the pipe's lines, and keep the link to the Uno alive while the pipe is silent."""
-    import queue
-    import threading
-
     from bifa.measure.desk import read_lines
 
     come: queue.Queue[str | None] = queue.Queue()

@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PROFILE, QUICK, RERUN, Profile
+from bifa.cli._options import OUT, PROFILE, QUICK, RERUN, Profile
 
 EXAMPLES = ("bifa demo", "bifa demo --seed 3 --out out/three", "bifa demo --quick", "bifa demo --rerun diagnose")
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for all artefacts; name it again to resume.")] = Path("out/demo"),
+    out: Annotated[Path, OUT] = Path("out/demo"),
     seed: Annotated[
         int, typer.Option(min=0, help="Random seed of the robot, its undisclosed effect and all noise.")
     ] = 4,

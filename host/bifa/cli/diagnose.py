@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, nullcontext
+from datetime import date
+from functools import partial
+from json import dumps
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
 from bifa import cluster
-from bifa.cli._options import BENCH_FILE, DATASET, WATCH, file_option, port_option, requires
+from bifa.cli._options import BASE_MODEL, BENCH_FILE, DATASET, WATCH, port_option, requires
 from bifa.cli.campaign import at_desk
 from bifa.cli.check import warn_of_findings
+from bifa.files import check_targets, named, write_text
+from bifa.screen import Console, words
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from contextlib import AbstractContextManager
-
-    from rich.progress import Progress
-
     from bifa.data import Dataset
     from bifa.rig import Rig
-    from bifa.screen import Console
     from lacuna.diagnosis.diagnose import Diagnosis
 
 
@@ -40,7 +42,7 @@ def diagnose(
     json: Annotated[Path | None, typer.Option(help="Write the verdict as JSON.")] = None,
     out: Annotated[Path | None, typer.Option(help="Write the model, completed with the effects found.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report with the evidence.")] = None,
-    model: Annotated[Path | None, file_option("Base model to start from (default: the nominal one).")] = None,
+    model: Annotated[Path | None, BASE_MODEL] = None,
     seed: Annotated[int, typer.Option(min=0, help="Random seed; the same seed gives the same verdict.")] = 0,
     resolve: Annotated[
         bool,
@@ -73,9 +75,6 @@ def diagnose(
 ) -> None:
     """Fit the base model, find what its residuals have in common across repeats, name the cause, and add it to the
     model. Reports the error before and after on held-out trials. The exit status is 0 for any verdict."""
-    from contextlib import nullcontext
-
-    from bifa.files import check_targets, named
     from bifa.rig import check_port, is_offered
 
     if not resolve:
@@ -84,10 +83,6 @@ def diagnose(
         requires("a serial port", watch=watch)
     check_targets(json, out, report, inputs=(model,))
     check_port(port)
-
-    from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
-
-    from bifa.screen import Console, words
 
     console = Console()
     with console.status("reading"):
@@ -131,7 +126,7 @@ def diagnose(
         with workers as (executor, _):
             found = run_diagnosis(measured)
             if resolve:
-                rigs = _rigs(measured, port, progress)
+                rigs = partial(_opened, measured, port, progress)
                 try:
                     measured, found, _ = further.resolve(
                         measured, found, run_diagnosis, rigs, resolved, report_progress, hands
@@ -147,12 +142,7 @@ def _report(
     console: Console, measured: Dataset, found: Diagnosis, json: Path | None, model: Path | None, page: Path | None
 ) -> None:
     """Print the diagnosis, and write the files that were asked for."""
-    from datetime import date
-    from json import dumps
-    from shlex import quote
-
     from bifa.data.dataset import labels_of
-    from bifa.files import write_text
     from bifa.identify.completed import completed_model
     from bifa.report.diagnosis import diagnosis_page
     from bifa.report.page import write_page
@@ -184,28 +174,24 @@ def _curves(found: Diagnosis, labels: dict[str, str]) -> Any:
     return compared_curves(trials, predictions, labels)
 
 
-def _rigs(measured: Dataset, port: str | None, progress: Progress) -> Callable[[int], AbstractContextManager[Rig]]:
-    """Return a function that opens the rig for a further experiment. A virtual robot is the one in the data set's
-    provenance. While a person works the instruments, `progress` is stopped so as not to overwrite the questions."""
-    from contextlib import contextmanager
-
+@contextmanager
+def _opened(measured: Dataset, port: str | None, progress: Progress, number: int) -> Iterator[Rig]:
+    """Open the rig for further experiment `number`. A virtual robot is the one in the data set's provenance. While a
+    person works the instruments, `progress` is stopped so as not to overwrite the questions."""
     from bifa.campaign.resolve import SPECIMEN
     from bifa.rig import open_rig
 
-    made = {**measured.provenance, **measured.provenance.get("options", {})}
-    options = {key: made[key] for key in SPECIMEN if key in made} if port == "virtual" else {}
-
-    @contextmanager
-    def opened(number: int) -> Iterator[Rig]:
-        with open_rig(port, **options, **({"seed": 1000 + number} if port == "virtual" else {})) as rig:
-            if rig.instruments is not None:
-                yield rig
-                return
-            progress.stop()
+    options: dict[str, Any] = {}
+    if port == "virtual":
+        made = {**measured.provenance, **measured.provenance.get("options", {})}
+        options = {key: made[key] for key in SPECIMEN if key in made} | {"seed": 1000 + number}
+    with open_rig(port, **options) as rig:
+        if rig.instruments is not None:
             yield rig
-        progress.start()
-
-    return opened
+            return
+        progress.stop()
+        yield rig
+    progress.start()
 
 
 def print_diagnosis(console: Console, record: dict[str, Any], labels: dict[str, str]) -> None:

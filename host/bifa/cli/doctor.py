@@ -3,9 +3,11 @@
 from typing import Annotated
 
 import typer
+from rich.text import Text
 
 from bifa.cli._options import port_option
 from bifa.computer import EXAMPLE_PORT
+from bifa.screen import Console
 
 EXAMPLES = ("bifa doctor", f"bifa doctor --port {EXAMPLE_PORT}", "bifa doctor --port virtual")
 
@@ -15,9 +17,6 @@ def doctor(port: Annotated[str | None, port_option("Also query the board at this
 
     Exits with status 1 if something required is missing.
     """
-    from rich.text import Text
-
-    from bifa.screen import Console
     from bifa.toolchain.checks import MISSING, run_checks
 
     colors = {"ok": "green", "missing": "red", "optional": "yellow"}

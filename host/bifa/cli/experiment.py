@@ -2,10 +2,14 @@
 
 import math
 import shlex
+from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+from rich.table import Column
 
 from bifa.cli._options import (
     BENCH,
@@ -21,15 +25,14 @@ from bifa.cli._options import (
     stoppable,
 )
 from bifa.computer import EXAMPLE_PORT
+from bifa.files import check_targets
 from bifa.printable import counted
+from bifa.screen import Console, warning, words
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from bifa.measure.plan import PlannedTrial
     from bifa.measure.session import Event
     from bifa.robot import Gait
-    from bifa.screen import Console
 
 
 EXAMPLES = (
@@ -105,7 +108,6 @@ def experiment(
     files that they save are read as declared in bench.toml (see bifa instrument and docs/campaign.md).
     Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
-    from bifa.files import check_targets
     from bifa.rig import check_port
 
     given = {"actuator": actuator, "rate": rate, "gait": gait, "cycles": cycles, "inclination": inclination or None}
@@ -125,7 +127,6 @@ def experiment(
     from bifa.measure.bench_file import parse_known
     from bifa.ranges import RANGES
     from bifa.robot import BASELINE
-    from bifa.screen import Console
 
     console = Console()
     if not add:
@@ -150,9 +151,7 @@ def experiment(
         quick=quick,
     )
     if instrument is not None:
-        _import(
-            console, instrument, telemetry, _single_condition(trials), out, parse_known(known), add, bench or BENCH_FILE
-        )
+        console.print(_import(instrument, telemetry, trials, out, known, add, bench or BENCH_FILE))
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
     with stoppable(lambda: f"valves off; {kept(out, 'finished trial')}; run the same command to resume"):
@@ -175,7 +174,7 @@ def _load(path: Path) -> "Gait":
 
 
 def _run(
-    console: "Console",
+    console: Console,
     port: str | None,
     options: dict[str, Any],
     out: Path,
@@ -185,23 +184,13 @@ def _run(
     watch: Path | None,
     bench: Path | None,
 ) -> None:
-    from contextlib import nullcontext
-
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-    from rich.table import Column
 
     from bifa.cli.campaign import at_desk
     from bifa.measure.bench_file import known_of
     from bifa.measure.session import provenance, run_session
     from bifa.rig import open_rig
-    from bifa.screen import warning, words
 
-    columns = (
-        words("{task.description}", table_column=Column(no_wrap=False)),  # this column wraps on narrow terminals
-        BarColumn(bar_width=20),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
+    wrapped = words("{task.description}", table_column=Column(no_wrap=False))  # on narrow terminals
     # Cycles are not part of a walk's condition, but a session can only be resumed with the same number of them.
     cycles = max(trial.cycles for trial in trials)
     errors: list[float] = []
@@ -211,7 +200,7 @@ def _run(
             hands = at_desk(console, watch, bench or BENCH_FILE)[1]
         else:
             requires("a rig without instruments", watch=watch, bench=bench)
-        bars = Progress(*columns, console=console)
+        bars = Progress(wrapped, BarColumn(20), MofNCompleteColumn(), TimeRemainingColumn(), console=console)
         task = bars.add_task(name, total=len(trials))
 
         def on_event(event: "Event") -> None:
@@ -242,39 +231,35 @@ def _run(
     console.print(f"Next: bifa check {quoted}, then bifa fit {quoted} --out model.toml", soft_wrap=True)
 
 
-def _single_condition(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":
-    """Return the only condition that the options select; the condition of an imported record cannot be guessed."""
+def _import(
+    instrument: Path,
+    telemetry: Path | None,
+    trials: "Sequence[PlannedTrial]",
+    out: Path,
+    known: list[str],
+    add: bool,
+    bench: Path,
+) -> str:
+    """Import a record of the only condition that the options select, which cannot be guessed; say what was imported."""
+    from bifa.data.export import ROLES
+    from bifa.measure.bench_file import parse_known, read_exports
+    from bifa.measure.instrument_csv import import_trial
+
     first = [trial for trial in trials if trial.repeat == 1]
     if len(first) > 1:
         raise typer.BadParameter(
             f"--instrument imports one trial, but {len(first)} conditions match, from {first[0].title!r} to "
             f"{first[-1].title!r}: specify the experiment, --actuator, --pressure, --rate or --gait"
         )
-    return first[0]
-
-
-def _import(
-    console: "Console",
-    instrument: Path,
-    telemetry: Path | None,
-    planned: "PlannedTrial",
-    out: Path,
-    known: dict[str, float],
-    add: bool,
-    bench: Path,
-) -> None:
-    from bifa.data.export import ROLES
-    from bifa.measure.bench_file import read_exports
-    from bifa.measure.instrument_csv import import_trial
-
+    values = parse_known(known)
     if telemetry is None:
         raise typer.BadParameter(
             "--instrument requires --telemetry: the Uno's telemetry of the same time, from `bifa record`"
         )
-    export = read_exports(bench).get(ROLES[planned.experiment])
-    dataset, clock = import_trial(instrument, telemetry, planned, out, known, add=add, export=export)
+    export = read_exports(bench).get(ROLES[first[0].experiment])
+    dataset, clock = import_trial(instrument, telemetry, first[0], out, values, add=add, export=export)
     trial = dataset.trials[-1]
-    console.print(
+    return (
         f"{out}: {trial.file}, {len(trial.time_s)} samples; synchronised over {clock.edges} edges to "
         f"{1e3 * clock.rms_s:.2f} ms RMS, drift {1e6 * (clock.rate - 1):+.0f} ppm."
     )

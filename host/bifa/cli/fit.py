@@ -1,13 +1,19 @@
 """`bifa fit`: fit the model's parameters to a data set, with their uncertainty."""
 
 import shlex
+import time
+from datetime import date
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
-from bifa.cli._options import DATASET, PICTURES, file_option
+from bifa.cli._options import BASE_MODEL, DATASET, PICTURES, REPORT
 from bifa.cli.check import warn_of_findings
+from bifa.files import check_targets, written_into
+from bifa.printable import counted
+from bifa.screen import Console, words
 
 EXAMPLES = (
     "bifa fit out/bench --out model.toml",
@@ -18,8 +24,8 @@ EXAMPLES = (
 def fit(
     dataset: Annotated[Path, DATASET],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
-    model: Annotated[Path | None, file_option("Base model to start from (default: the nominal one).")] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report.")] = None,
+    model: Annotated[Path | None, BASE_MODEL] = None,
+    report: Annotated[Path | None, REPORT] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
 ) -> None:
     """Identify the model (the paper's section IV), first from static loadings, rests and sensors separately, then
@@ -27,17 +33,7 @@ def fit(
     error in units of the noise, and writes a model file for `bifa simulate` and `bifa optimize`. The pictures show
     every condition as measured and as modelled, like the paper's Figs. 4 to 6.
     """
-    from bifa.files import check_targets, written_into
-
     check_targets(out, report, folders=(pictures,), inputs=(model,))
-
-    import time
-    from datetime import date
-
-    from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
-
-    from bifa.printable import counted
-    from bifa.screen import Console, words
 
     console = Console()
     with console.status("reading"):

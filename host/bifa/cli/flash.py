@@ -1,13 +1,13 @@
 """`bifa flash`: write the firmware to the Uno, and check that it answers."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bifa.cli._options import port_option
 from bifa.computer import EXAMPLE_PORT
+from bifa.screen import Console
 
 EXAMPLES = ("bifa flash", f"bifa flash --port {EXAMPLE_PORT}", "bifa flash --build-only")
 
@@ -25,15 +25,14 @@ def flash(
     Vent the supplies first: while the bootloader runs, the valve pins float, and only the gates' pull-downs
     keep the valves off.
     """
+    from bifa.firmware import carried_image
     from bifa.link import Uno
     from bifa.rig import open_rig
-    from bifa.screen import Console
-    from bifa.toolchain import build_image, choose_port, find_project, project_folder
+    from bifa.toolchain import build_image, choose_port, find_project, project_folder, upload_image, write_with_avrdude
 
     console = Console()
-    on_line: Callable[[str], None] = (
-        console.out if verbose else lambda _: None
-    )  # a tool that fails shows its output anyway
+    # a tool that fails shows its output anyway
+    on_line: Callable[[str], None] = console.out if verbose else lambda _: None
     project = project_folder() if build_only else find_project()
     chosen = None if build_only else choose_port(port)
     if project is not None:
@@ -44,20 +43,13 @@ def flash(
         return
     with console.status(f"writing to {chosen}"):
         try:
-            _write(project, chosen, on_line)
+            if project is not None:
+                upload_image(project, chosen, on_line)
+            else:
+                write_with_avrdude(carried_image(), chosen, on_line)
         except KeyboardInterrupt:
             console.print("interrupted: the Uno may hold half an image; run `bifa flash` again")
             raise
     with console.status("waiting for the firmware"), open_rig(chosen) as rig, Uno(rig.transport, rig.clock) as uno:
         hello = uno.connect()
     console.print(f"firmware {hello.firmware} answers on {chosen}")
-
-
-def _write(project: Path | None, port: str, on_line: Callable[[str], None]) -> None:
-    from bifa.firmware import carried_image
-    from bifa.toolchain import upload_image, write_with_avrdude
-
-    if project is not None:
-        upload_image(project, port, on_line)
-    else:
-        write_with_avrdude(carried_image(), port, on_line)

@@ -1,15 +1,15 @@
 """`bifa gaits`: list the library of gaits, or recompute it."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.table import Table
 
 from bifa.cli._options import file_option, gait_names, requires, stoppable
-
-if TYPE_CHECKING:
-    from bifa.screen import Console
-
+from bifa.files import check_targets
+from bifa.screen import Console
 
 EXAMPLES = ("bifa gaits", "bifa gaits --make", "bifa gaits --make --model mine.toml --out my-gaits")
 
@@ -26,11 +26,7 @@ def gaits(
     seed: Annotated[int | None, typer.Option(min=0, help="Random seed of the searches (default: 0).")] = None,
 ) -> None:
     """List the library's gaits, with predicted speeds and files for `bifa upload`, or recompute them."""
-    from rich.table import Table
-
-    from bifa.files import check_targets
     from bifa.gait import library
-    from bifa.screen import Console
 
     console = Console()
     names = [library.checked(name) for name in only] or list(library.NAMES)
@@ -64,9 +60,7 @@ def gaits(
     console.print(f"files: {library.FOLDER / 'NAME.toml'}", soft_wrap=True)
 
 
-def _make(console: "Console", model_path: Path | None, folder: Path, names: list[str], seed: int) -> None:
-    from dataclasses import replace
-
+def _make(console: Console, model_path: Path | None, folder: Path, names: list[str], seed: int) -> None:
     from bifa.cli.optimize import search_progress
     from bifa.gait import optimize, simulations
     from bifa.gait.library import scenarios

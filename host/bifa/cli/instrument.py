@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from bifa.cli._options import BENCH_FILE
+from bifa.errors import BifaError
+from bifa.files import check_targets, write_text
+from bifa.screen import Console
 
 if TYPE_CHECKING:
     from bifa.data.export import Export
     from bifa.measure.propose import Look
-    from bifa.screen import Console
 
 EXAMPLES = (
     "bifa instrument export.csv",
@@ -39,7 +41,6 @@ def instrument(
     file, where `bifa campaign` and `bifa experiment` look for it. Nothing is declared without asking you.
     """
     from bifa.data.export import presets as known
-    from bifa.screen import Console
 
     console = Console()
     if presets:
@@ -51,15 +52,16 @@ def instrument(
     if role is not None and role not in _ROLES:
         raise typer.BadParameter(f"--role must be machine or camera, not {role}")
 
-    from bifa.errors import BifaError
-    from bifa.files import check_targets, write_text
     from bifa.measure.bench_file import read_exports
     from bifa.measure.propose import declaration, look
 
     check_targets(bench, inputs=(file,))
     seen = look(file)
     _show(console, file, seen)
-    role = role or _choice("Which instrument wrote it?", _ROLES, None)
+    while role not in _ROLES:
+        if role is not None:
+            typer.echo(f"answer one of {', '.join(_ROLES)}")
+        role = typer.prompt(f"Which instrument wrote it? ({', '.join(_ROLES)})")
     if role in read_exports(bench):
         raise BifaError(
             f"{bench} already declares [instrument.{role}]: remove that table first, or name another --bench"
@@ -74,7 +76,7 @@ def instrument(
         console.print(f"written: {bench}")
 
 
-def _show(console: "Console", file: Path, seen: "Look") -> None:
+def _show(console: Console, file: Path, seen: "Look") -> None:
     """Show what was found in the file: format, names, units, rows, plots."""
     import numpy as np
 
@@ -84,10 +86,8 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
     from bifa.report.terminal import print_table
 
     plain = not console.encoding.lower().startswith("utf")
-    how = (
-        ", ".join(f"{key} {value!r}" for key, value in seen.how.items())
-        or "comma-separated, decimal points, names in the first line"
-    )
+    how = ", ".join(f"{key} {value!r}" for key, value in seen.how.items())
+    how = how or "comma-separated, decimal points, names in the first line"
     console.print(f"{file}: {how}; {len(seen.sheet)} rows from line {seen.sheet.line(0)} on")
     for role, name in seen.presets.items():
         console.print(f"As the file of a {role}, it matches the preset {name}.")
@@ -106,7 +106,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
                 console.print(line)
 
 
-def _ask_declaration(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
+def _ask_declaration(console: Console, seen: "Look", role: str) -> dict[str, Any]:
     """Ask for the declaration, question by question; Enter accepts the proposal in brackets."""
     from bifa.data.export import units_for
     from bifa.measure.propose import parsed, wanted
@@ -117,9 +117,8 @@ def _ask_declaration(console: "Console", seen: "Look", role: str) -> dict[str, A
     given = parsed(role, {"preset": preset}) if preset else None
     columns: dict[str, str] = {}
     units: dict[str, str] = {}
-    sign: dict[str, int] = {}
-    factor: dict[str, float] = {}
     more: dict[str, Any] = {}
+    changes: dict[str, dict[str, float]] = {"factor": {}, "sign": {}}
     for name in [*wanted(role), *(["displacement_tail_mm"] if role == "camera" else [])]:
         proposed = given.columns.get(name) if given else None
         if not (proposed and seen.sheet.has(proposed)):
@@ -132,19 +131,18 @@ def _ask_declaration(console: "Console", seen: "Look", role: str) -> dict[str, A
         columns[name] = column
         told = seen.unit(name, column.split(" + ")[0]) or (given.units.get(name) if given else None)
         units[name], scale = _unit(column, units_for(name), told, name == "time_s")
-        factor |= {} if scale == 1.0 else {name: scale}
+        changes["factor"] |= {} if scale == 1.0 else {name: scale}
         if name != "time_s" and typer.confirm(f"Reverse the sign of {name}?", default=False):
-            sign[name] = -1
+            changes["sign"][name] = -1
         more |= _clock(units[name], given) if name == "time_s" else {}
     table: dict[str, Any] = {"preset": preset} if preset else dict(seen.how)
     if not given or any(given.columns.get(n) != c or given.units.get(n) != units[n] for n, c in columns.items()):
         table |= {"columns": columns, "units": units}
     table |= {key: value for key, value in more.items() if not given or getattr(given, key) != value}
-    table |= {key: chosen for key, chosen in (("factor", factor), ("sign", sign)) if chosen}
-    return table | _sync(console, seen)
+    return table | {key: chosen for key, chosen in changes.items() if chosen} | _sync(console, seen)
 
 
-def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -> str:
+def _column(console: Console, seen: "Look", name: str, proposed: str | None) -> str:
     while True:
         optional = "" if name == "time_s" else " (- if there is none)"
         column = typer.prompt(f"Which column is {name}{optional}?", default=proposed)
@@ -154,7 +152,7 @@ def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -
             return column
 
 
-def _is_there(console: "Console", seen: "Look", column: str) -> bool:
+def _is_there(console: Console, seen: "Look", column: str) -> bool:
     """Whether the export has the column; prints an error if it has not."""
     from bifa.data.errors import DatasetError
 
@@ -164,14 +162,6 @@ def _is_there(console: "Console", seen: "Look", column: str) -> bool:
         console.print(str(error))
         return False
     return True
-
-
-def _choice(question: str, allowed: list[str], proposed: str | None) -> str:
-    while True:
-        answer = typer.prompt(f"{question} ({', '.join(allowed)})", default=proposed)
-        if answer in allowed:
-            return answer
-        typer.echo(f"answer one of {', '.join(allowed)}")
 
 
 def _unit(column: str, allowed: list[str], told: str | None, is_time: bool) -> tuple[str, float]:
@@ -199,7 +189,7 @@ def _clock(unit: str, given: "Export | None") -> dict[str, Any]:
     return ({"date_format": form} if form else {}) | ({"zone": zone} if zone != "UTC" else {})
 
 
-def _sync(console: "Console", seen: "Look") -> dict[str, Any]:
+def _sync(console: Console, seen: "Look") -> dict[str, Any]:
     """Ask where the strobe's edges are recorded."""
     while True:
         answer = typer.prompt(
@@ -220,7 +210,7 @@ def _sync(console: "Console", seen: "Look") -> dict[str, Any]:
             }
 
 
-def _verify(console: "Console", file: Path, role: str, table: dict[str, Any]) -> None:
+def _verify(console: Console, file: Path, role: str, table: dict[str, Any]) -> None:
     """Read the file as declared, and print what it contains; raises DatasetError if that fails."""
     import numpy as np
 

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import PORT, file_option, requires
+from bifa.screen import Console
 
 _WEB_PORT = 8765
 
@@ -53,19 +54,15 @@ def monitor(
     from bifa.rig import SameBoard, open_rig
     from bifa.robot import load_model, nominal
     from bifa.robot.gait import read_gait_file
-    from bifa.screen import Console
 
     console = Console()
     parameters = read_gait_file(gait).parameters if gait else {}
     robot = load_model(model) if model else nominal()
 
-    def adjust(uno: Uno) -> None:
+    def begin(uno: Uno, is_back: bool = False) -> None:
         if parameters:
             uno.upload(parameters)
-
-    def begin(uno: Uno) -> None:
-        adjust(uno)
-        if run:
+        if run and not is_back:
             uno.run()
 
     try:
@@ -74,8 +71,7 @@ def monitor(
                 watch(Uno(rig.transport, rig.clock), rig.clock, console, seconds, begin)
             return
         with console.status("starting the page"):
-            from bifa.live.web.flights import fly
-            from bifa.live.web.pilot import Pilot
+            from bifa.live.web.pilot import Pilot, fly
             from bifa.live.web.server import LivePage, served
             from bifa.report.page import live_page
 
@@ -85,6 +81,6 @@ def monitor(
         say = partial(console.print, soft_wrap=True)
         with served(page, _WEB_PORT if web_port is None else web_port) as address:
             say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
-            fly(pilot, SameBoard(port), page.tell, say, seconds, begin, adjust)
+            fly(pilot, SameBoard(port), page.tell, say, seconds, begin)
     except KeyboardInterrupt:
         typer.echo("valves off")

@@ -2,22 +2,23 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.progress import BarColumn, Progress, TimeElapsedColumn
+from rich.table import Table
 
 from bifa import cluster
 from bifa.cli._options import PICTURES, Method, file_option
-from bifa.files import named
+from bifa.files import check_targets, named, written_into
+from bifa.screen import Console, warning, words
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from bifa.gait.pool import Simulations
     from bifa.gait.search import Optimum
     from bifa.robot import Model
-    from bifa.screen import Console
 
 
 EXAMPLES = (
@@ -71,12 +72,8 @@ def optimize(
     model itself may have no slip at all, and then collapses if a parameter changes by 1 %. Pictures go to a folder next
     to the gait file by default.
     """
-    from bifa.files import check_targets, written_into
-
     folder = pictures or pictures_beside(out)
     check_targets(out, folders=() if no_pictures else (folder,), inputs=(model, *(begin or ())))
-
-    from bifa.screen import Console, warning
 
     console = Console()
     with ExitStack() as stack:
@@ -128,12 +125,8 @@ def pictures_beside(out: Path) -> Path:
 
 
 @contextmanager
-def search_progress(console: "Console") -> Iterator[Callable[[str], Callable[[str, float, float], None]]]:
+def search_progress(console: Console) -> Iterator[Callable[[str], Callable[[str, float, float], None]]]:
     """Show progress bars; yields a function that adds one by its title and returns the callback for `optimize`."""
-    from rich.progress import BarColumn, Progress, TimeElapsedColumn
-
-    from bifa.screen import words
-
     columns = (words("{task.description}"), BarColumn(), TimeElapsedColumn(), words("{task.fields[best]}"))
     with Progress(*columns, console=console, transient=True) as progress:
 
@@ -148,9 +141,8 @@ def search_progress(console: "Console") -> Iterator[Callable[[str], Callable[[st
         yield begin
 
 
-def _summary(optimum: "Optimum") -> "Table":
+def _summary(optimum: "Optimum") -> Table:
     import numpy as np
-    from rich.table import Table
 
     from bifa.report.words import gait_parameter_words
 
@@ -169,8 +161,6 @@ def _summary(optimum: "Optimum") -> "Table":
 
 
 def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: Path) -> list[str]:
-    from dataclasses import replace
-
     from bifa.gait import Settings, library, optimize
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution

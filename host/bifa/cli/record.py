@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import PORT, file_option, kept, requires, stoppable
+from bifa.files import check_targets
+from bifa.screen import Console
 
 _CYCLES, _REPEATS = 6, 1
 
@@ -39,7 +41,6 @@ def record(
     vanishes, the data recorded so far are kept, and recording resumes when the same Uno is back; you are asked before
     it walks again. Run an interrupted command again to resume it.
     """
-    from bifa.files import check_targets
     from bifa.rig import check_port
 
     check_targets(folders=(out,))
@@ -50,7 +51,6 @@ def record(
     from bifa.report.words import gait_words
     from bifa.rig import SameBoard, open_rig
     from bifa.robot.gait import BASELINE, read_gait_file
-    from bifa.screen import Console
 
     console = Console()
     steps = plain_spaces(gait_words((read_gait_file(gait).gait if gait else BASELINE).as_dict()))

@@ -1,6 +1,8 @@
 """`bifa rig`: serve the virtual bench on a pseudo-terminal in real time, for any serial program."""
 
 import math
+import os
+import signal
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,6 +10,8 @@ import typer
 
 from bifa.cli._options import PROFILE, Profile, effects
 from bifa.errors import BifaError
+from bifa.files import check_targets
+from bifa.screen import Console
 
 EXAMPLES = (
     "bifa rig",
@@ -37,12 +41,7 @@ def rig(
 
     Opening the port resets the board, as with a real Uno. Any serial program can connect, at 250000 baud.
     """
-    import os
-    import signal
-
-    from bifa.files import check_targets
     from bifa.rig import open_rig
-    from bifa.screen import Console
 
     if not hasattr(os, "openpty"):
         raise BifaError("bifa rig serves a pseudo-terminal, which needs Linux or macOS (on Windows: WSL)")

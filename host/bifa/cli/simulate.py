@@ -1,21 +1,23 @@
 """`bifa simulate`: simulate a walk, or compare the model with the paper's figures."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.table import Table
+from rich.text import Text
 
 from bifa.cli._options import PICTURES, Obstacle, file_option, requires
+from bifa.files import check_targets, written, written_into
+from bifa.screen import Console
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import numpy as np
 
     from bifa.robot import Gait, Model
-    from bifa.screen import Console
-    from bifa.simulate import Advance, Supports
-    from bifa.simulate.terrain import Obstacle as Obstacle_
+    from bifa.simulate import Advance
+    from bifa.simulate.passing import Passing
 
 
 _CYCLES, _BUCKLING_N = 10, 27.0
@@ -70,12 +72,9 @@ def simulate(
     if not obstacle:
         requires("--obstacle", buckling=buckling)
 
-    from bifa.files import check_targets, written_into
-
     check_targets(out, folders=(pictures,), inputs=(model, gait))
 
     from bifa import robot
-    from bifa.screen import Console
 
     console = Console()
     chosen = robot.load_model(model) if model else robot.nominal()
@@ -92,6 +91,7 @@ def simulate(
         import numpy as np
 
         from bifa.simulate import SimulationError, Supports, gait_rows, obstacles, speeds, terrain, walk
+        from bifa.simulate.passing import passing
 
         ahead = obstacles(obstacle) if obstacle else ()
         supports = Supports(_BUCKLING_N if buckling is None else buckling)
@@ -104,9 +104,15 @@ def simulate(
         raise SimulationError(f"{chosen.name} cannot be simulated: a curve or a value is unlike any robot's")
     _print_walk(console, chosen, file.gait, progress)
     if ahead:
-        _print_passing(console, chosen, file.gait, ahead, supports, inclination)
+        _print_passing(console, passing(chosen, file.gait, ahead, supports, inclination))
     if not (obstacle or inclination):
-        _print_prediction(console, chosen, file.gait)
+        from bifa.gait import predict_speed, spread_of
+
+        known = spread_of(chosen)
+        with console.status("predicting"):
+            prediction = predict_speed(chosen, known, file.gait)
+        console.print(f"predicted, 90 %: {prediction.text}")
+        console.print(f"what is known: {known.text}")
     if out:
         write_csv(out, record.columns)
         console.print(f"channels: {out}")
@@ -119,8 +125,8 @@ def simulate(
         console.print(f"picture: {pictures / 'walk.png'}")
 
 
-def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Advance") -> None:
-    from rich.table import Table
+def _print_walk(console: Console, model: "Model", gait: "Gait", progress: "Advance") -> None:
+    from bifa.gait.settling import MIN_CYCLES, settling
 
     table = Table(title=f"{model.name}, period {gait.period_s:g} s", title_justify="left")
     for heading in ("cycle", "advance [mm]", "slip [mm]", "speed [mm/s]"):
@@ -129,8 +135,6 @@ def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Adv
         table.add_row(str(k + 1), f"{1e3 * advance:.2f}", f"{1e3 * slip:.3f}", f"{1e3 * advance / gait.period_s:.2f}")
     console.print(table)
     console.print(f"speed of the last cycle: {progress.speed_mm_s[0]:.2f} mm/s")
-    from bifa.gait.settling import MIN_CYCLES, settling
-
     found = settling(1e3 * progress.advance_m[0])
     if found.is_settled:
         console.print(f"settled from cycle {found.begins + 1} on")
@@ -140,28 +144,9 @@ def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Adv
         console.print(f"not settled: the last {found.cycles} cycles vary by {found.varies:.1%}; try more --cycles")
 
 
-def _print_prediction(console: "Console", model: "Model", gait: "Gait") -> None:
-    """Print the speed predicted for a robot, given what the model's fit knows about it."""
-    from bifa.gait import predict_speed, spread_of
+def _print_passing(console: Console, outcome: "Passing") -> None:
+    from bifa.simulate.passing import LONGEST_S
 
-    known = spread_of(model)
-    with console.status("predicting"):
-        prediction = predict_speed(model, known, gait)
-    console.print(f"predicted, 90 %: {prediction.text}")
-    console.print(f"what is known: {known.text}")
-
-
-def _print_passing(
-    console: "Console",
-    model: "Model",
-    gait: "Gait",
-    ahead: "Sequence[Obstacle_]",
-    supports: "Supports",
-    inclination: float,
-) -> None:
-    from bifa.simulate.passing import LONGEST_S, passing
-
-    outcome = passing(model, gait, ahead, supports, inclination)
     said = f"through after {outcome.seconds:.0f} s" if outcome.through else f"not through in {LONGEST_S:.0f} s"
     console.print(said)
     for name, end, stroke in (("extension", "head", outcome.extension), ("contraction", "tail", outcome.contraction)):
@@ -171,15 +156,13 @@ def _print_passing(
         )
 
 
-def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None") -> None:
-    """Compare both shipped models with their fastest gaits, or one model and gait, with the paper."""
-    from rich.table import Table
-    from rich.text import Text
-
+def _print_paper(console: Console, model: "Model | None", gait: "Gait | None") -> None:
+    """Compare both shipped models with their fastest gaits, or one model and gait, with the paper's figures and its
+    section VI.B: which gaits pass an obstacle, and which strokes build up too little force."""
     from bifa import robot
 
     with console.status("simulating every experiment"):
-        from bifa.simulate.paper import FAST, FAST_STRONG, compare
+        from bifa.simulate.paper import FAST, FAST_STRONG, compare, obstacle_rows
 
         pairs = [(model, gait or FAST)] if model else [(robot.nominal(), FAST), (robot.strong_push(), FAST_STRONG)]
         tables = [compare(*pair) for pair in pairs]
@@ -191,35 +174,21 @@ def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None")
         table.add_row(rows[0].what, rows[0].paper, *shown, rows[0].remark)
     console.print(table)
     for chosen, fast in pairs:
-        _print_obstacles(console, chosen, fast)
-
-
-def _print_obstacles(console: "Console", model: "Model", fast: "Gait") -> None:
-    """Print the paper's section VI.B: which gaits pass an obstacle, and which strokes build up too little force."""
-    from rich.table import Table
-    from rich.text import Text
-
-    from bifa.simulate.paper import obstacle_rows
-
-    title = Text.assemble(
-        f"Obstacles, {model.name}: force in N that a stroke builds up / needs; ", _RED, ": not enough"
-    )
-    headings = ("obstacle", "gait", "through", "extension", "contraction")
-    table = Table(*headings, title=title, title_justify="left")
-    for obstacle, gait, outcome in obstacle_rows(model, fast):
-        strokes = (outcome.extension, outcome.contraction)
-        shown = (f"{stroke.built_up_N:.0f} / {stroke.needed_N:.0f}" for stroke in strokes)
-        marked = (Text(text, "" if s.enough else "red") for text, s in zip(shown, strokes, strict=True))
-        through = Text(f"{outcome.seconds:.0f} s") if outcome.through else Text("no", "red")
-        table.add_row(obstacle, gait, through, *marked)
-    console.print(table)
+        title = Text.assemble(
+            f"Obstacles, {chosen.name}: force in N that a stroke builds up / needs; ", _RED, ": not enough"
+        )
+        table = Table("obstacle", "gait", "through", "extension", "contraction", title=title, title_justify="left")
+        for obstacle, which, outcome in obstacle_rows(chosen, fast):
+            through = Text(f"{outcome.seconds:.0f} s") if outcome.through else Text("no", "red")
+            strokes = (outcome.extension, outcome.contraction)
+            forces = (Text(f"{s.built_up_N:.0f} / {s.needed_N:.0f}", "" if s.enough else "red") for s in strokes)
+            table.add_row(obstacle, which, through, *forces)
+        console.print(table)
 
 
 def write_csv(path: Path, columns: "Mapping[str, np.ndarray]") -> None:
     """Write columns, arrays of shape (n,), by name."""
     import numpy as np
-
-    from bifa.files import written
 
     rows = np.column_stack(list(columns.values()))
     with written(path) as aside:

@@ -7,6 +7,7 @@ import typer
 
 from bifa.cli._options import PORT, requires
 from bifa.computer import EXAMPLE_PORT
+from bifa.screen import Console
 
 EXAMPLES = (
     "bifa upload gait.toml",
@@ -43,7 +44,6 @@ def upload(
     from bifa.live.walk import walk
     from bifa.rig import open_rig
     from bifa.robot.gait import read_gait_file
-    from bifa.screen import Console
 
     parameters = read_gait_file(gait).parameters
     console = Console()

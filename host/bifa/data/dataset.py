@@ -89,22 +89,17 @@ class Trial:
     @property
     def label(self) -> str:
         """The condition in a few words, for tables and plots."""
-        parts = ["walk" if self.experiment == "locomotion" else self.experiment.replace("_", " ")]
-        if self.actuator:
-            parts.append(self.actuator)
-        if self.pressure_psi is not None:
-            parts.append(f"{self.pressure_psi:g} psi")
-        if self.rate_mm_s is not None:
-            parts.append(f"{self.rate_mm_s:g} mm/s")
-        if self.gait:
-            parts.append(f"period {self.gait['period_s']:g} s")
-        if "load_cell_N_m" in self.extra:
-            parts.append(f"load cell {self.extra['load_cell_N_m']:g} N/m")
-        if "direction" in self.extra:
-            parts.append(str(self.extra["direction"]))
-        if "inclination_deg" in self.extra:
-            parts.append(f"pipe at {self.extra['inclination_deg']:g} degrees")
-        return ", ".join(parts)
+        settings = (
+            ("{}", self.actuator),
+            ("{:g} psi", self.pressure_psi),
+            ("{:g} mm/s", self.rate_mm_s),
+            ("period {:g} s", (self.gait or {}).get("period_s")),
+            ("load cell {:g} N/m", self.extra.get("load_cell_N_m")),
+            ("{}", self.extra.get("direction")),
+            ("pipe at {:g} degrees", self.extra.get("inclination_deg")),
+        )
+        experiment = "walk" if self.experiment == "locomotion" else self.experiment.replace("_", " ")
+        return ", ".join([experiment, *(form.format(value) for form, value in settings if value is not None)])
 
     def to_pandas(self) -> Any:
         """Return the columns as a DataFrame over time, with file, condition and repeat in its `attrs`."""
@@ -192,15 +187,12 @@ def conditions_of(dataset: Dataset) -> dict[str, str]:
     called: dict[str, str] = {}
     for label, groups in alike.items():
         gaits = [group[0].gait or {} for group in groups]
-        names = [name for name in {name: None for gait in gaits for name in gait} if not _is_same(name, gaits)]
+        every = dict.fromkeys(name for gait in gaits for name in gait)
+        names = [name for name in every if len({gait.get(name) for gait in gaits}) > 1]
         for group, gait in zip(groups, gaits, strict=True):
             parts = [f"{name} {gait[name]:.4g}" for name in names if name in gait]
             called |= {trial.file: ", ".join([label, *parts]) for trial in group}
     return called
-
-
-def _is_same(name: str, gaits: Sequence[Mapping[str, float]]) -> bool:
-    return len({gait.get(name) for gait in gaits}) == 1
 
 
 def labels_of(dataset: Dataset) -> dict[str, str]:

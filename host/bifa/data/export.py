@@ -183,16 +183,11 @@ def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.nda
         place = sheet.find(source)
         _refuse_other_unit(sheet, place, name, unit)
         values = sheet.numbers(place, source, rows)
-    return values * _scale(export, name) + export.offset.get(name, 0.0)
-
-
-def _scale(export: Export, name: str) -> float:
-    unit = export.units.get(name)
+    size = _sizes(name).get(unit, 1.0) if unit else 1.0
     if unit == FRAME and export.rate_hz is not None:
         size = 1.0 / export.rate_hz
-    else:
-        size = _sizes(name).get(unit, 1.0) if unit else 1.0
-    return size * export.factor.get(name, 1.0) * export.sign.get(name, 1)
+    scale = size * export.factor.get(name, 1.0) * export.sign.get(name, 1)
+    return values * scale + export.offset.get(name, 0.0)
 
 
 def _moments(sheet: Sheet, export: Export, source: str, rows: np.ndarray) -> list[datetime]:

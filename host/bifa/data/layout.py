@@ -5,11 +5,13 @@ from dataclasses import dataclass
 FORMAT = 1
 TABLE_FILE = "dataset.toml"
 RAW = "raw"  # folder in a data set for unchanged copies of the instruments' files
-ACTUATORS = ("large", "small")
-DIRECTIONS = ("forward", "backward")
+CHAMBERS = ("body", "head", "tail")
 
 INCLINATION_RANGE_DEG = (-90.0, 90.0)
 PRESSURE_RANGE_PSI = (-15.0, 15.0)  # the sensor's span, Honeywell ABP...015PD: +-15 psi
+# Settings of a trial that are one of some words, and those within a range.
+CHOICES = {"actuator": ("large", "small"), "direction": ("forward", "backward")}
+LIMITS = {"pressure_psi": PRESSURE_RANGE_PSI, "inclination_deg": INCLINATION_RANGE_DEG}
 
 # Parameters of a trial's gait, required and optional.
 GAIT = ("period_s", "psi12_deg", "psi13_deg", "duty_body", "duty_head", "duty_tail")
@@ -55,13 +57,9 @@ EXPERIMENTS: dict[str, Layout] = {
     "locomotion": Layout(
         columns=(
             "time_s",
-            "command_body",
-            "command_head",
-            "command_tail",
+            *(f"command_{chamber}" for chamber in CHAMBERS),
             "displacement_head_mm",
-            "pressure_body_psi",
-            "pressure_head_psi",
-            "pressure_tail_psi",
+            *(f"pressure_{chamber}_psi" for chamber in CHAMBERS),
         ),
         optional_columns=("displacement_tail_mm",),
         rate_hz=100.0,

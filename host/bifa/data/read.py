@@ -18,15 +18,14 @@ from .errors import DatasetError
 from .export import OWN_NAMES, ROLES, Export, parse_exports, read_columns
 from .fields import Fields, Source
 from .layout import (
-    ACTUATORS,
-    DIRECTIONS,
+    CHAMBERS,
+    CHOICES,
     EXPERIMENTS,
     FORMAT,
     GAIT,
     GAIT_OPTIONAL,
-    INCLINATION_RANGE_DEG,
+    LIMITS,
     NOTED,
-    PRESSURE_RANGE_PSI,
     SETTINGS,
     TABLE_FILE,
     Layout,
@@ -34,7 +33,6 @@ from .layout import (
 )
 from .sheet import Sheet
 
-_CHAMBERS = tuple(c.removeprefix("command_") for c in EXPERIMENTS["locomotion"].columns if is_command(c))
 LARGEST = 1e12  # in any unit: beyond any measurement, yet small enough to be squared and averaged
 _SHORTEST_STEP_S = 1e-6
 _CLOCK_S = 0.1  # tolerance for times outside their trial: of the order of a command's age
@@ -191,8 +189,8 @@ def _check_switches(trial: Trial, fields: Fields) -> None:
     extra = fields.inner("extra", {"switch_time_s": noted})
     lists = [noted]
     if trial.experiment == "locomotion":
-        if not isinstance(noted, dict) or set(noted) - set(_CHAMBERS):
-            raise extra.error("switch_time_s", f"{trial.file}: must be a table of lists {', '.join(_CHAMBERS)}")
+        if not isinstance(noted, dict) or set(noted) - set(CHAMBERS):
+            raise extra.error("switch_time_s", f"{trial.file}: must be a table of lists {', '.join(CHAMBERS)}")
         lists = list(noted.values())
     low, high = trial.time_s[0] - _CLOCK_S, 1.1 * trial.time_s[-1] + _CLOCK_S  # a clock may be 10 % off (NOTED)
     for times in lists:
@@ -203,14 +201,10 @@ def _check_switches(trial: Trial, fields: Fields) -> None:
 
 
 def _setting(fields: Fields, key: str) -> Any:
-    if key == "actuator":
-        return fields.choice(key, ACTUATORS)
-    if key == "direction":
-        return fields.choice(key, DIRECTIONS)
-    if key == "pressure_psi":
-        return fields.number(key, *PRESSURE_RANGE_PSI)
-    if key == "inclination_deg":
-        return fields.number(key, *INCLINATION_RANGE_DEG)
+    if key in CHOICES:
+        return fields.choice(key, CHOICES[key])
+    if key in LIMITS:
+        return fields.number(key, *LIMITS[key])
     if key == "gait":
         return _gait(fields.inner(key, fields.take(key)))
     return fields.positive(key)  # rate_mm_s, load_cell_N_m

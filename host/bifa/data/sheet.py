@@ -161,7 +161,10 @@ class Sheet:
             raise self._error(f"cannot be read as a CSV: {error}", number) from None
 
     def _workbook(self) -> tuple[list[str], list[list[str]], Any]:
-        frame, rows = workbook(self._path, self._form.sheet, self.file)
+        sheet = self._form.sheet
+        place = _PLACE.fullmatch(sheet or "[1]")  # no sheet's name has brackets
+        frame = _excel(self._path, int(place[2]) - 1 if place and not place[1] else sheet, self.file)
+        rows = _texts(frame)
         lines = [self._form.separator.join(row) for row in rows]
         begin = self._first_head(lines)
         count = self._form.header_rows + self._form.units_rows
@@ -366,20 +369,13 @@ def _exact() -> dict[str, str]:
     return {"float_precision": "round_trip"} if old else {}
 
 
-def workbook(path: Path, sheet: str | None, file: str) -> tuple[Any, list[list[str]]]:
-    """Read a sheet of a workbook (by its name or place; the first if `sheet` is None): the DataFrame of pandas, and
-    the cells as text. Raises DatasetError."""
-    place = _PLACE.fullmatch(sheet or "[1]")  # no sheet's name has brackets
-    frame = _excel(path, int(place[2]) - 1 if place and not place[1] else sheet, file)
-    return frame, _texts(frame)
-
-
 def sheets(path: Path, file: str) -> list[list[list[str]]]:
     """Return the cells of each sheet of a workbook as text. Raises DatasetError."""
     return [_texts(frame) for frame in _excel(path, None, file).values()]
 
 
 def _excel(path: Path, sheet: str | int | None, file: str) -> Any:
+    """Read a sheet, by its name or its place from 0, as a DataFrame; all of them, by name, if `sheet` is None."""
     import pandas
 
     try:

@@ -11,27 +11,23 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 _PLACES = {
-    "metric": ("Metric", "Passage"),
+    "metric": ("Metric",),
     "pool": ("simulations",),
-    "prediction": ("Prediction", "predict_speed"),
+    "prediction": ("predict_speed",),
     "search": ("Optimum", "SearchError", "Settings", "optimize"),
-    "settling": ("measured_speed",),
-    "space": ("SearchSpace", "SpaceError", "paper_space"),
-    "uncertainty": ("Knowledge", "UncertaintyError", "spread_of"),
+    "space": ("paper_space",),
+    "uncertainty": ("UncertaintyError", "spread_of"),
 }
 
 __all__ = [name for names in _PLACES.values() for name in names]
 
 if TYPE_CHECKING:
     from bifa.gait.metric import Metric as Metric
-    from bifa.gait.metric import Passage as Passage
     from bifa.gait.pool import simulations as simulations
     from bifa.gait.search import Optimum as Optimum
     from bifa.gait.search import SearchError as SearchError
     from bifa.gait.search import Settings as Settings
     from bifa.gait.search import optimize as optimize
-    from bifa.gait.space import SearchSpace as SearchSpace
-    from bifa.gait.space import SpaceError as SpaceError
     from bifa.gait.space import paper_space as paper_space
     from bifa.gait.uncertainty import UncertaintyError as UncertaintyError
     from bifa.gait.uncertainty import spread_of as spread_of

@@ -38,12 +38,11 @@ class Simulations:
 
 
 @contextmanager
-def simulations(dask: str | None = None, workers: int | None = None, tls: Tls = Tls()) -> Iterator[Simulations]:  # noqa: B008
+def simulations(dask: str | None = None, tls: Tls = Tls()) -> Iterator[Simulations]:  # noqa: B008
     """Yield `Simulations` on this machine's cores, or on the dask cluster with its scheduler at the address `dask`."""
     if dask is None:
-        count = workers or cores()
-        with ThreadPoolExecutor(count, thread_name_prefix="bifa-gait") as executor:
-            yield Simulations(executor, count)
+        with ThreadPoolExecutor(cores(), thread_name_prefix="bifa-gait") as executor:
+            yield Simulations(executor, cores())
         return
     with cluster(dask, tls) as (executor, count):
         yield Simulations(executor, count)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -85,17 +84,6 @@ class Prediction:
             f"{self.walks_probability:.2f}"
         )
 
-    @property
-    def as_record(self) -> dict[str, object]:
-        """Plain types for summaries and provenance."""
-        return {
-            "speed_mm_s": round(self.speed_mm_s, 3),
-            "interval_90_mm_s": [round(v, 3) for v in self.interval_90_mm_s],
-            "interval_80_mm_s": [round(v, 3) for v in self.interval_mm_s(0.8)],
-            "walks_probability": round(self.walks_probability, 4),
-            "cycles_to_settle": self.cycles,
-        }
-
     def _quantile(self, share: float) -> float:
         walking = (self.speeds_mm_s + self.errors_mm_s)[self.walks]
         return float(np.quantile(walking, share)) * (-1.0 if self.backward else 1.0) if walking.size else 0.0
@@ -124,7 +112,8 @@ class Predictor:
         progress = speeds(self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, workers=workers)
         advance_mm = 1e3 * progress.advance_m
         found = [settling(one) for one in advance_mm]
-        settled = _settling_cycles(f.begins for f in found[:draws] if f.is_settled)
+        begins = [f.begins for f in found[:draws] if f.is_settled]
+        settled = int(np.ceil(np.quantile(begins, 0.95))) if begins else CYCLES  # of nineteen of twenty robots
         means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
         noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
         camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (MIN_CYCLES * gait.period_s)  # of a speed over `MIN_CYCLES` cycles
@@ -163,9 +152,3 @@ def predict_speed(
 def settles(model: Model) -> bool:
     """Whether the model's walks become periodic: no effect makes each cycle differ from the one before."""
     return not any(library()[effect].unlike_cycles for effect in model.effects)
-
-
-def _settling_cycles(begins: Iterable[int]) -> int:
-    """Cycles within which nineteen of twenty robots settle."""
-    every = list(begins)
-    return int(np.ceil(np.quantile(every, 0.95))) if every else CYCLES

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifa.data.lost import runs as runs_of
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, distribution, on_model
 from bifa.gait.pool import Simulations
@@ -15,6 +16,7 @@ from bifa.simulate import Plant, gait_rows
 
 # Half-width of each parameter's scan: relative for the period, in degrees, or as a fraction of the cycle.
 _REACH = {"period_s": 0.15, "psi12_deg": 40.0, "psi13_deg": 40.0, "duty_body": 0.06, "duty_head": 0.1, "duty_tail": 0.1}
+_FRONT_POINTS = 25  # on the line between two gaits
 
 
 @dataclass(frozen=True)
@@ -67,12 +69,8 @@ def sensitivity(
 def _room(values: np.ndarray, quantile: np.ndarray) -> tuple[float, float]:
     middle = len(values) // 2
     good = (quantile >= 0.9 * quantile[middle]) & (quantile[middle] >= STANDING_MM_S)
-    low = high = middle
-    while low > 0 and good[low - 1]:
-        low -= 1
-    while high < len(values) - 1 and good[high + 1]:
-        high += 1
-    return float(values[low]), float(values[high])
+    low, end = next(((low, end) for low, end in runs_of(good) if low <= middle < end), (middle, middle + 1))
+    return float(values[low]), float(values[end - 1])
 
 
 @dataclass(frozen=True)
@@ -93,21 +91,15 @@ class Front:
 
 
 def front(
-    runs: Simulations,
-    nominal: Plant,
-    draws: Sequence[Plant],
-    robust: Gait,
-    fast: Gait,
-    metric: Metric | Passage,
-    points: int = 25,
+    runs: Simulations, nominal: Plant, draws: Sequence[Plant], robust: Gait, fast: Gait, metric: Metric | Passage
 ) -> Front:
     """Trade speed against robustness: evaluate gaits on and around the line from the robust gait to the fastest one."""
     ends = gait_rows([robust, fast])
     shift = ends[1] - ends[0]
     shift[1:3] = (shift[1:3] + 180.0) % 360.0 - 180.0  # the shorter way round
-    rows = ends[0] + np.linspace(0.0, 1.0, points)[:, None] * shift
+    rows = ends[0] + np.linspace(0.0, 1.0, _FRONT_POINTS)[:, None] * shift
     # The period alone is the simplest trade-off: the same gaits, faster or slower.
-    some, periods = rows[:: max(1, points // 6)], np.linspace(0.97, 1.03, 7)
+    some, periods = rows[:: _FRONT_POINTS // 6], np.linspace(0.97, 1.03, 7)
     around = np.repeat(some, len(periods), axis=0)
     around[:, 0] = np.outer(some[:, 0], periods).ravel()
     rows = np.concatenate([rows, around])

@@ -15,14 +15,13 @@ from bifa.robot import Model
 from bifa.robot.model import LEARNT, Covariance
 from bifa.simulate import plant
 from lacuna.estimation.fit import Fit
-from lacuna.estimation.structure import is_learnt, knot_name
+from lacuna.estimation.structure import is_learnt, knot_names
 from lacuna.estimation.uncertainty import Uncertainty, clustered_covariance, uncertainty
 
 
 def completed_model(fit: Fit, date: str = "") -> Model:
-    """Return the fitted model, effects and learnt curves included, with the covariance of the values that the data
-    determine and the scatter beyond it, as used by `bifa simulate` and `bifa optimize`. `date`: of the fit, for the
-    provenance."""
+    """Return the fitted model, effects and learnt curves included, with its covariance and the scatter beyond it, for
+    `bifa simulate` and `bifa optimize`. `date`: of the fit, for the provenance."""
     structure = fit.structure
     model = cast(RobotSystem, structure.system).model_at(fit.theta, structure.effects)
     model = replace(model, learnt=learnt_curves(plant(model), structure.corrections(fit.theta)))
@@ -59,8 +58,7 @@ def _with_uncertainty(model: Model, fit: Fit, known: Uncertainty, sd: Mapping[st
 
 
 def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
-    """Map each of the fit's parameters to the values of `model` that it changes (its own, or those of a curve) and the
-    change per unit."""
+    """Map each parameter of the fit to the values of `model` that it changes (its own or a curve's), per unit."""
     structure = fit.structure
     system = cast(RobotSystem, structure.system)
     own = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}
@@ -70,18 +68,14 @@ def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
     for site, learnt in model.learnt.items():
         knots = system.correction_sites[site].knots
         each = (learnt.values.shape[1] - 1) // (knots - 1)
-        for row in range(len(learnt.values)):
-            for knot in range(knots):
-                name = knot_name(system.correction_sites[site], row, knot)
-                found[name] = {f"{LEARNT}.{site}.{row}.{knot * each}": 1.0}
+        for row, names in enumerate(knot_names(system.correction_sites[site])):
+            found |= {name: {f"{LEARNT}.{site}.{row}.{knot * each}": 1.0} for knot, name in enumerate(names)}
     return found
 
 
 def labeled(model: Model, system: RobotSystem, command: str, date: str = "") -> Model:
-    """Return `model`, fitted to the data set of `system`, with a name, its provenance and the source of each value.
-
-    date: of the fit; left out if the same data have to give the same bytes.
-    """
+    """Return `model`, fitted to the data set of `system`, with a name, its provenance (with `date`, that of the fit,
+    unless the same data have to give the same bytes), and the source of each value."""
     dataset = system.dataset
     sources = dict.fromkeys(dataset.known, f"[known] of {dataset.name}")
     sources |= dict.fromkeys(system.fitted, f"fitted to {dataset.name}")

@@ -7,10 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifa.data import Trial
-from bifa.identify.start import ACTUATORS
 from bifa.problem.inputs import WALK
-from bifa.problem.system import RobotSystem
+from bifa.problem.system import CURVE_OF, RobotSystem
 from lacuna.check.numbers import fast_noise
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.estimation.fit import Fit
@@ -25,21 +23,16 @@ def with_doubts(found: Diagnosis, system: RobotSystem) -> Diagnosis:
 
 def assumed_curves(system: RobotSystem) -> tuple[str, ...]:
     """A sentence for each actuator whose stiffness curve the trials need but do not determine."""
-    felt = {actuator for trial in system.dataset.trials for actuator in _felt(trial)}
+    felt = set()
+    for trial in system.dataset.trials:
+        felt |= set(CURVE_OF) if trial.experiment == WALK else {trial.actuator or "small"}  # a pull tests a head
     return tuple(
         f"There is no static_loading of the {actuator} actuator at 0 psi, so its stiffness curve is that of the model "
         f"{system.model.name!r}: where this robot's curve differs, the difference may be taken for an effect, or for "
         "something that no effect explains."
-        for actuator, prefix in ACTUATORS.items()
+        for actuator, prefix in CURVE_OF.items()
         if prefix not in system.curves and actuator in felt
     )
-
-
-def _felt(trial: Trial) -> tuple[str, ...]:
-    """The actuators whose stiffness curves a trial depends on."""
-    if trial.experiment == WALK:
-        return tuple(ACTUATORS)
-    return (trial.actuator or "small",)  # a pull tests a head
 
 
 def repeats_apart(fit: Fit) -> Iterator[str]:

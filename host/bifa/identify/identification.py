@@ -13,9 +13,9 @@ from bifa.identify.completed import described
 from bifa.identify.start import fit_statics, prepare
 from bifa.identify.static import IntervalEstimate, StaticFit
 from bifa.problem.inputs import ANCHOR
-from bifa.problem.system import PIPE, RobotSystem
+from bifa.problem.system import CURVE_OF, PIPE, RobotSystem
 from bifa.robot import Model
-from lacuna.estimation.fit import Fit, fit_base
+from lacuna.estimation.fit import Fit, fit_base, rms_by_channel
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.settle import settle
 from lacuna.estimation.solve import one_thread, solve
@@ -31,27 +31,22 @@ _NORMAL_HALF = round(NormalDist().inv_cdf(0.5 + CONFIDENCE / 2), 4)  # half-widt
 # mu_s shows in a single sample of each pull, the breakaway, so its cost is not quadratic.
 _PROFILED = "mu_s"
 
-_GIVEN_BY = {
-    "body_damping_Ns_m": "step_response of the large actuator",
-    "body_area_N_psi": "static_loading of the large actuator at two pressures or more, one of them 0",
-    "body_alpha_n_per_s": "step_response of the large actuator",
-    "body_alpha_s_per_s": "step_response of the large actuator",
-    "small_damping_Ns_m": "step_response of the small actuator",
-    "small_area_N_psi": "static_loading of the small actuator at two pressures or more, one of them 0",
-    "small_alpha_n_per_s": "step_response of the small actuator",
-    "small_alpha_s_per_s": "step_response of the small actuator",
-    "wall_offset_m": "anchor_pull at three pressures",
-    "mu_s": "anchor_pull at three pressures",
-    "mu_k": "anchor_pull at three pressures",
-    "supply_positive_psi": "locomotion, or a gauge",
-    "supply_negative_psi": "step_response, or a gauge",
-    "head_mass_kg": "a balance (a step response does not determine the moving mass)",
-    "head_segment_mass_kg": "a balance",
-    "tail_mass_kg": "a balance (a step response does not determine the moving mass)",
-    "small_mass_kg": "a balance (a step response does not determine the moving mass)",
-    "wall_stiffness_N_m": "pressing a head against a force gauge (a pull cannot separate it from friction and offset)",
-    "wall_damping_Ns_m": "an impact test at 1 kHz or more",
+_DETERMINES = {  # experiments, and the parameters that each determines
+    "step_response of the large actuator": ("body_damping_Ns_m", "body_alpha_n_per_s", "body_alpha_s_per_s"),
+    "static_loading of the large actuator at two pressures or more, one of them 0": ("body_area_N_psi",),
+    "step_response of the small actuator": ("small_damping_Ns_m", "small_alpha_n_per_s", "small_alpha_s_per_s"),
+    "static_loading of the small actuator at two pressures or more, one of them 0": ("small_area_N_psi",),
+    "anchor_pull at three pressures": PIPE,
+    "locomotion, or a gauge": ("supply_positive_psi",),
+    "step_response, or a gauge": ("supply_negative_psi",),
+    "a balance (a step response does not determine the moving mass)": ("head_mass_kg", "tail_mass_kg", "small_mass_kg"),
+    "a balance": ("head_segment_mass_kg",),
+    "pressing a head against a force gauge (a pull cannot separate it from friction and offset)": (
+        "wall_stiffness_N_m",
+    ),
+    "an impact test at 1 kHz or more": ("wall_damping_Ns_m",),
 }
+_GIVEN_BY = {name: experiment for experiment, names in _DETERMINES.items() for name in names}
 
 
 @dataclass(frozen=True)
@@ -65,13 +60,10 @@ class Open:
 
 @dataclass(frozen=True)
 class Identification:
-    """What a data set says about the robot.
-
-    model: the identified model, its covariance included. fit: the joint fit. uncertainty: of every fitted parameter.
-    intervals: 90 % intervals by name, from the profile likelihood where the quadratic approximation misleads. statics:
-    the static stage by actuator. open: what could not be determined. error: RMS residual in units of the noise floor,
-    by experiment and channel.
-    """
+    """What a data set says about the robot: the identified `model`, its covariance included; the joint `fit` and the
+    `uncertainty` of every fitted parameter; 90 % `intervals`, from the profile likelihood where the quadratic
+    approximation misleads; the static stage by actuator; what is left `open`; the `error` by experiment and channel,
+    RMS in units of the noise floor."""
 
     system: RobotSystem
     model: Model
@@ -92,10 +84,8 @@ def identify(
     on_progress: Callable[[str], None] = lambda stage: None,
 ) -> Identification:
     """Identify the robot of `dataset`, starting from `model` (default: nominal): first from static loadings, rests and
-    sensors alone, then jointly from all experiments. `date`: of the fit, for the model's provenance.
-
-    Raises UndeterminedError if nothing at all can be fitted. Deterministic.
-    """
+    sensors alone, then jointly from all experiments. `date`: of the fit, for the model's provenance. Deterministic.
+    Raises UndeterminedError if nothing at all can be fitted."""
     system = prepare(dataset, model, on_progress)
     on_progress("all experiments together, pressures included")
     fit = fit_base(system, system.trials)
@@ -114,7 +104,7 @@ def identify(
         intervals=intervals,
         statics=fit_statics(dataset),
         open=_open(system, identified, dataset, known, intervals),
-        error=_errors(fit),
+        error=rms_by_channel(fit.problem.trials, fit.scaled_residuals()),
     )
 
 
@@ -133,14 +123,13 @@ def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, I
 
 
 def _profiles(fit: Fit, intervals: Mapping[str, IntervalEstimate]) -> dict[str, IntervalEstimate]:
-    """Profile-likelihood interval from the pulls alone, the rest of the robot held at the joint fit; never narrower
-    than the quadratic one."""
+    """Profile interval from the pulls alone, the rest held at the joint fit; never narrower than the quadratic one."""
     pulls = [trial for trial in fit.problem.trials if trial.experiment == ANCHOR]
     if not pulls or not all(name in intervals for name in PIPE):
         return {}
     free = tuple(fit.structure.names.index(name) for name in PIPE)
     problem = Problem(fit.structure, pulls, fit.problem.floor)
-    local = Fit(problem, solve(problem, problem.start(fit.solution.point.values), free=free), 1, 1)
+    local = Fit(problem, solve(problem, problem.start(fit.solution.point.values), free=free))
     old = intervals[_PROFILED]
     low, high = profile_interval(local, _PROFILED)
     low, high = min(low, old.lower), max(high, old.upper)
@@ -166,17 +155,8 @@ def _open(
     }
     names = [n for n in identified.parameters if n not in resolved]
     found = [Open(n, identified[n], _GIVEN_BY[n]) for n in names]
-    for actuator, prefix in (("large", "body"), ("small", "small")):
+    for actuator, prefix in CURVE_OF.items():
         if prefix not in system.curves:
             needs = f"static_loading of the {actuator} actuator at 0 psi"
             found.append(Open(f"{prefix} stiffness curve", float("nan"), needs))
     return tuple(found)
-
-
-def _errors(fit: Fit) -> dict[tuple[str, str], float]:
-    """RMS residual in units of the noise floor, by experiment and channel."""
-    squares: dict[tuple[str, str], list[float]] = {}
-    for trial, channels in zip(fit.problem.trials, fit.scaled_residuals(), strict=True):
-        for channel, z in channels.items():
-            squares.setdefault((trial.experiment, channel), []).append(float(np.nanmean(z**2)))
-    return {key: float(np.sqrt(np.mean(values))) for key, values in squares.items()}

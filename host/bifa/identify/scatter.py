@@ -13,6 +13,7 @@ from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.problem.switches import seconds_per_uno_s
 from bifa.problem.system import FRICTION_WOBBLE, RobotSystem
 from bifa.robot.model import Scatter
+from lacuna.diagnosis.nuisances import runs_of
 from lacuna.estimation.fit import Fit
 from lacuna.system import Channels, Record
 
@@ -22,8 +23,7 @@ _LAST = 50  # samples of a walk, over which its end is averaged
 
 
 def scatter_of(fit: Fit) -> Scatter:
-    """Estimate the scatter from residuals and the runs' friction on the fitted trials; rounded, since it is based on
-    some tens of runs."""
+    """Estimate the scatter on the fitted trials; rounded, since it is based on some tens of runs."""
     found = {
         "friction": _between_runs(fit),
         "pressure_psi": _unexplained(fit, (STEP, WALK), "pressure"),
@@ -37,8 +37,7 @@ def scatter_of(fit: Fit) -> Scatter:
 
 
 def session_drifts(fit: Fit) -> dict[str, float]:
-    """RMS over the session of each learnt drift, by the scatter it adds to: the next walk is at an unknown point of
-    another session."""
+    """RMS over the session of each learnt drift, by the scatter it adds to: the next walk may be anywhere in one."""
     learnt = {c.site: float(np.sqrt(np.mean(c.table**2))) for c in fit.structure.corrections(fit.theta)}
     own = cast(RobotSystem, fit.structure.system).model  # has the values that are known and so not fitted
     area_N_psi, supply_psi = (fit.theta.get(name, own[name]) for name in ("body_area_N_psi", "supply_positive_psi"))
@@ -51,8 +50,7 @@ def session_drifts(fit: Fit) -> dict[str, float]:
 
 
 def switch_timing(system: RobotSystem) -> Scatter:
-    """Mean switch timing of the walks: near the edge a quarter of a per cent of the period, or a few milliseconds,
-    decide."""
+    """Mean switch timing of the walks: near the edge, 0.25 % of the period or a few milliseconds decide."""
     walks = [trial for trial in system.dataset.trials if trial.experiment == WALK]
     if not walks:
         return Scatter()
@@ -66,12 +64,7 @@ def switch_timing(system: RobotSystem) -> Scatter:
 
 def _between_runs(fit: Fit) -> float:
     """Standard deviation of the friction factor between runs, combined with its prior."""
-    factors = [
-        values[k]
-        for values, parameters in zip(fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
-        for k, parameter in enumerate(parameters)
-        if parameter.name == "friction_scale"
-    ]
+    factors = [run.value for run in runs_of([fit]) if run.nuisance.name == "friction_scale"]
     square = sum((value - 1.0) ** 2 for value in factors) + _PRIOR_RUNS * FRICTION_WOBBLE**2
     return float(np.sqrt(square / (len(factors) + _PRIOR_RUNS)))
 

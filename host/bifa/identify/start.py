@@ -17,11 +17,10 @@ from bifa.identify.static import StaticFit, fit_static
 from bifa.problem.curves import FittedCurve
 from bifa.problem.stiffness import UndeterminedError
 from bifa.problem.switches import step_timeline
-from bifa.problem.system import RobotSystem, fittable
+from bifa.problem.system import CURVE_OF, RobotSystem, fittable
 from bifa.robot import Model, ModelParameterError
 from lacuna.estimation.solve import one_thread
 
-ACTUATORS = {"large": "body", "small": "small"}
 _SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that is taken for its supply
 _SETTLED_MM_S = 0.5  # slower than this an actuator is at rest
 _SAMPLES = 20  # from which that is judged
@@ -34,38 +33,31 @@ def prepare(
 ) -> RobotSystem:
     """Return a system ready to be fitted to `dataset`. Values that the lab knows come from the data set; curves, areas
     and supplies start from the static stage, everything else from `model` (default: nominal), a base model.
-
-    `on_progress` receives the stage's name. Raises UndeterminedError if nothing in the data set can be fitted,
-    ModelParameterError if the model has effects or learnt curves.
-    """
+    `on_progress` receives each stage's name. Raises UndeterminedError if nothing can be fitted, ModelParameterError if
+    the model has effects or learnt curves."""
     if not dataset.trials:
         raise UndeterminedError("the data set holds no trials: nothing can be fitted")
     model = model or robot.nominal()
-    _refuse_completed(model)
+    if tables := [f"[effects.{name}]" for name in model.effects] + [f"[learnt.{name}]" for name in model.learnt]:
+        raise ModelParameterError(
+            f"model {model.name!r} has {', '.join(tables)}, but a fit starts from a base model: give one without them, "
+            "such as the nominal one; `bifa diagnose` finds effects and curves again (with `--suspect EFFECT` it "
+            "always tries one that was named before)"
+        )
     on_progress("static loading: stiffness and area")
     statics = fit_statics(dataset)
     values = _known(dataset, model) | _supplies(dataset, model) | _areas(statics, model)
-    curves = {ACTUATORS[a]: _curve(dataset, fit, values, model) for a, fit in statics.items()}
+    curves = {CURVE_OF[a]: _curve(dataset, fit, values, model) for a, fit in statics.items()}
     system = RobotSystem(dataset, model.with_values(values), curves, fittable(dataset, curves))
     if not system.parameters:
         raise UndeterminedError("these trials constrain no unknown parameter of the model")
     return system
 
 
-def _refuse_completed(model: Model) -> None:
-    tables = [f"[effects.{name}]" for name in model.effects] + [f"[learnt.{name}]" for name in model.learnt]
-    if tables:
-        raise ModelParameterError(
-            f"model {model.name!r} has {', '.join(tables)}, but a fit starts from a base model: give one without them, "
-            "such as the nominal one; `bifa diagnose` finds effects and curves again (with `--suspect EFFECT` it "
-            "always tries one that was named before)"
-        )
-
-
 def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
     """Static fits of the actuators loaded at 0 psi; step responses, if any, limit how far the curve is continued."""
     found = {}
-    for actuator in ACTUATORS:
+    for actuator in CURVE_OF:
         try:
             found[actuator] = fit_static(dataset, actuator, _reach_m(dataset, actuator))
         except UndeterminedError:
@@ -78,7 +70,7 @@ def _areas(statics: Mapping[str, StaticFit], model: Model) -> dict[str, float]:
     found = {}
     for actuator, fit in statics.items():
         if fit.area_N_psi is not None:
-            parameter, area = model.parameters[f"{ACTUATORS[actuator]}_area_N_psi"], fit.area_N_psi.value
+            parameter, area = model.parameters[f"{CURVE_OF[actuator]}_area_N_psi"], fit.area_N_psi.value
             try:
                 found[parameter.name] = parameter.with_value(area).value
             except ModelParameterError as error:
@@ -91,7 +83,7 @@ def _areas(statics: Mapping[str, StaticFit], model: Model) -> dict[str, float]:
 
 def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model: Model) -> FittedCurve:
     """The static curve, pinned at the actuator's rest positions in step responses."""
-    prefix, stiffness = ACTUATORS[fit.actuator], fit.stiffness
+    prefix, stiffness = CURVE_OF[fit.actuator], fit.stiffness
     name = f"{prefix}_area_N_psi"
     area = values.get(name, model[name])
     rest_m, held_psi = _rests(dataset, fit.actuator).T
@@ -119,7 +111,7 @@ def _known(dataset: Dataset, model: Model) -> dict[str, float]:
 def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
     """Supplies that the lab did not measure, read off the sensors as initial values for the joint fit."""
     found = {}
-    vacuum = [psi for actuator in ACTUATORS for _, psi in _rests(dataset, actuator) if psi < 0]
+    vacuum = [psi for actuator in CURVE_OF for _, psi in _rests(dataset, actuator) if psi < 0]
     if "supply_negative_psi" not in dataset.known and vacuum:
         found["supply_negative_psi"] = float(np.median(vacuum))
     walks = [t.columns["pressure_body_psi"] for t in dataset.of("locomotion") if t.pressure_psi is None]

@@ -27,11 +27,8 @@ class IntervalEstimate:
 
 @dataclass(frozen=True)
 class StaticFit:
-    """Result of static loading for one actuator.
-
-    area_N_psi: None if every trial was at 0 psi.
-    hysteresis_N: half the mean distance between the loading and the unloading branch at 0 psi.
-    """
+    """Result of static loading for one actuator. `area_N_psi`: None if every trial was at 0 psi; `hysteresis_N`: half
+    the mean distance between the loading and the unloading branch at 0 psi."""
 
     actuator: str
     stiffness: StiffnessFit
@@ -41,11 +38,7 @@ class StaticFit:
 
 def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | None = None) -> StaticFit:
     """Fit K at 0 psi through the middle of the hysteresis, then the area that brings the other pressures onto it.
-
-    reach_m: the smallest and largest displacement in other experiments.
-
-    Raises UndeterminedError if there is no trial at 0 psi.
-    """
+    `reach_m`: the range in other experiments. Raises UndeterminedError if there is no trial at 0 psi."""
     trials = dataset.of("static_loading", actuator)
     unloaded = [trial for trial in trials if abs(trial.commanded_psi) < UNPRESSURISED_PSI]
     if not unloaded:
@@ -82,11 +75,9 @@ def _area(stiffness: StiffnessFit, trials: list[Trial]) -> IntervalEstimate:
 
 
 def _weighted_mean(values: np.ndarray, weights: np.ndarray, common_sd: float) -> IntervalEstimate:
-    """Mean of repeated measurements with variances proportional to 1/weights, with an interval from their scatter.
-
-    `common_sd`: error shared by all of them, which therefore does not show in the scatter. Degrees of freedom by Welch
-    and Satterthwaite. A single measurement has an infinite interval, because its repeatability is unknown.
-    """
+    """Mean of measurements with variances proportional to 1/weights, with an interval from their scatter and
+    `common_sd`, an error that all share. Degrees of freedom by Welch and Satterthwaite. A single measurement has an
+    infinite interval, because its repeatability is unknown."""
     mean = float(np.average(values, weights=weights))
     n = len(values)
     if n < 2:

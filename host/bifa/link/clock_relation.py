@@ -60,12 +60,6 @@ class ClockRelation:
         return host_0 + rate * (uno_s - uno_0)
 
     @property
-    def offset_s(self) -> float:
-        """Host time minus Uno time at the middle of the exchanges."""
-        uno_s = self._origin()[0]
-        return self.to_host(uno_s).time_s - uno_s
-
-    @property
     def drift(self) -> float:
         """How much faster the host's clock runs than the Uno's, as a fraction."""
         low, high = self._extremes((0.0, 1.0))

@@ -69,14 +69,8 @@ class Hello:
     @classmethod
     def of(cls, report: frames.Report) -> "Hello":
         """Convert a hello report."""
-        return cls(
-            ".".join(map(str, report["firmware"])),
-            report["protocol"],
-            report["table_hash"],
-            report["boot_nonce"],
-            word(START_CAUSES, report["start_cause"]),
-            report["session_key"],
-        )
+        firmware, cause = ".".join(map(str, report["firmware"])), word(START_CAUSES, report["start_cause"])
+        return cls(**(report.fields | {"firmware": firmware, "start_cause": cause}))
 
 
 @dataclass
@@ -160,14 +154,6 @@ class Session:
         self.hello = hello
         return hello
 
-    def _renew(self, timeout_s: float) -> None:
-        """Open a new session with the same Uno, so that what an interrupted call left in flight is neither mistaken for
-        another call's answer nor carried out later."""
-        nonce = self.hello.boot_nonce if self.hello else None
-        if self.connect(timeout_s).boot_nonce != nonce:
-            raise RestartedError("the Uno restarted; connect again and repeat")
-        self.on_renewed()
-
     def _greet(self, name: str, values: tuple[Any, ...], deadline: float) -> Hello:
         """Send an open message repeatedly until a hello arrives."""
         message = frames.encode(COMMANDS[name], 0, values, frames.OPEN_SEED)
@@ -231,8 +217,11 @@ class Session:
         `timeout_s` is the longest time without progress. The first refused command raises RefusedError; those after it
         may have been carried out. After a call that was interrupted or not answered, the next call opens a new session.
         """
-        if self._is_calling:
-            self._renew(timeout_s)
+        if self._is_calling:  # what that call left in flight must not answer this one, nor be carried out later
+            nonce = self.hello.boot_nonce if self.hello else None
+            if self.connect(timeout_s).boot_nonce != nonce:
+                raise RestartedError("the Uno restarted; connect again and repeat")
+            self.on_renewed()
         self._is_calling = True
         try:
             answers = self._carry_out(deque(commands), timeout_s)

@@ -138,6 +138,14 @@ STATES = ('idle', 'running', 'holding', 'stopped', 'fault')
 FAULTS = ('none', 'over_pressure', 'sensor_range', 'sensor_stuck', 'regulator', 'supply_control', 'host_silent', 'watchdog', 'brown_out', 'restart')
 START_CAUSES = ('power', 'external', 'brown_out', 'watchdog', 'restart')
 
+# unit of a fault's value and limit, and how many of the Uno's own make one
+FAULT_UNITS = {
+    'over_pressure': ('psi', 1000),
+    'sensor_range': ('psi', 1000),
+    'regulator': ('psi', 1000),
+    'host_silent': ('s', 100),
+}
+
 # what people type: name, usage, help
 CONSOLE_COMMANDS = (
     ('help', 'help [NAME]', 'list everything, or explain one'),

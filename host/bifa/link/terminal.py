@@ -43,22 +43,18 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
     word = (line.split() or [""])[0]
     if word in MOVING_COMMANDS:
         uno.may_move = True
-    lines = _send_and_wait(uno, line, clock)
-    if word in PARAMETER_COMMANDS:
-        uno.parameters()  # reads `host_timeout_s`, and with it how often to keep the link alive
-    return lines
-
-
-def _send_and_wait(uno: Uno, line: str, clock: Clock) -> list[str]:
     _drop_answers(uno)
     uno.session.transport.write(line.encode("ascii", "replace") + b"\n")
     deadline = clock.now() + LONGEST_ANSWER_S
     lines: list[str] = []
-    while clock.now() < deadline:
-        uno.session.poll(0.02)
-        uno.session.raise_if_restarted()
-        while uno.session.lines:
+    while not (lines and is_answer(lines[-1])):
+        if uno.session.lines:
             lines.append(uno.session.lines.popleft())
-            if is_answer(lines[-1]):
-                return lines
-    raise NoAnswerError(f"no answer to {line!r}; check the cable, then connect again")
+        elif clock.now() >= deadline:
+            raise NoAnswerError(f"no answer to {line!r}; check the cable, then connect again")
+        else:
+            uno.session.poll(0.02)
+            uno.session.raise_if_restarted()
+    if word in PARAMETER_COMMANDS:
+        uno.parameters()  # reads `host_timeout_s`, and with it how often to keep the link alive
+    return lines

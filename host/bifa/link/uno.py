@@ -14,6 +14,7 @@ from bifa.link.table import (
     CHAMBER_STATES,
     CHAMBERS,
     DEAD_TIME_MS,
+    FAULT_UNITS,
     FAULTS,
     SAMPLE_PERIOD_MS,
     SCHEDULE_ENTRIES,
@@ -31,15 +32,10 @@ PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means around this time af
 SAMPLE_US = 1000 * SAMPLE_PERIOD_MS
 DEAD_TIME_S = 1e-3 * (DEAD_TIME_MS + 1)  # venting between the two supplies, including the wait for the tick
 CONNECTIONS = ("off", "positive", "vacuum", "both")  # indexed by the bits of a chamber's two valves
-# Unit of a fault's value and limit, and how many of the Uno's own make one; others have none worth telling.
-FAULT_UNITS = {
-    "over_pressure": ("psi", 1000),
-    "sensor_range": ("psi", 1000),
-    "regulator": ("psi", 1000),
-    "host_silent": ("s", 100),
-}
 LATEST_HOLD_S = (2**32 - 1) / 1000
 _WRAP_US = 1 << 32
+_AS_REPORTED: tuple[str, ...] = ("fault_channel", "fault_value", "fault_limit", "valves")
+_AS_REPORTED += ("frames_bad", "frames_repeated", "bytes_lost", "samples_lost")
 _OLDEST_US = 10_000_000  # by how much a sample may be older than the previous one
 
 
@@ -186,12 +182,6 @@ class Uno:
         if self._clock.now() >= self._next_exchange_s:
             self.exchange_clocks()
 
-    def _plan_exchanges(self, host_timeout_wire: int, is_pending: bool) -> None:
-        timeout_s = from_wire("host_timeout_s", host_timeout_wire or SESSION_TIMEOUT_MS)
-        longest_s = self._exchange_every_s if is_pending else CLOCK_EVERY_S  # the earlier time-out still counts
-        self._exchange_every_s = min(longest_s, timeout_s / 4)
-        self._next_exchange_s = min(self._next_exchange_s, self._clock.now() + self._exchange_every_s)
-
     # -- parameters -------------------------------------------------------------------------------------------
 
     def parameters(self) -> dict[str, float]:
@@ -221,19 +211,15 @@ class Uno:
         """
         wanted = {name: to_wire(name, value) for name, value in parameters.items()}
         wanted = {**self._read_set()[0], **wanted}
-        self._replace(wanted)
+        fields = [("field", (index_of(name), value)) for name, value in wanted.items()]
+        check = binascii.crc_hqx(pack_set(wanted), 0xFFFF)
+        self.session.call_all([("begin", ()), *fields, ("commit", (check,))])
+        if self._read_set()[0] != wanted:
+            raise LinkError("the parameters read back differ from those sent; upload again")
         if wait:
             self._wait_for_boundary(from_wire("period_s", wanted["period_s"]))
         if save is not None:
             self.save(save)
-
-    def _replace(self, wanted: dict[str, int]) -> None:
-        data = pack_set(wanted)
-        fields = [("field", (index_of(name), value)) for name, value in wanted.items()]
-        check = binascii.crc_hqx(data, 0xFFFF)
-        self.session.call_all([("begin", ()), *fields, ("commit", (check,))])
-        if self._read_set()[0] != wanted:
-            raise LinkError("the parameters read back differ from those sent; upload again")
 
     def _wait_for_boundary(self, period_s: float) -> None:
         deadline = self._clock.now() + 2 * max(period_s, 60.0)
@@ -243,9 +229,13 @@ class Uno:
             self.session.poll(0.02)
 
     def _read_set(self) -> tuple[dict[str, int], bool]:
+        """Read the parameters in wire units, and adapt to their `host_timeout_s` how often clocks are exchanged."""
         report = self.session.call("read_set")
         values, is_pending = unpack_set(report["set"]), bool(report["pending"])
-        self._plan_exchanges(values["host_timeout_s"], is_pending)
+        timeout_s = from_wire("host_timeout_s", values["host_timeout_s"] or SESSION_TIMEOUT_MS)
+        longest_s = self._exchange_every_s if is_pending else CLOCK_EVERY_S  # the earlier time-out still counts
+        self._exchange_every_s = min(longest_s, timeout_s / 4)
+        self._next_exchange_s = min(self._next_exchange_s, self._clock.now() + self._exchange_every_s)
         return values, is_pending
 
     # -- presets ----------------------------------------------------------------------------------------------
@@ -360,22 +350,15 @@ class Uno:
         return Status(
             state=word(STATES, report["state"]),
             fault=word(FAULTS, report["fault"]),
-            fault_channel=report["fault_channel"],
-            fault_value=report["fault_value"],
-            fault_limit=report["fault_limit"],
             fault_time_s=report["fault_time_ms"] / 1000,
             fault_lowest_psi=_psi(report["fault_lowest_mpsi"]),
             fault_highest_psi=_psi(report["fault_highest_mpsi"]),
             pressure_psi=_psi(report["pressure_mpsi"]),
-            valves=report["valves"],
             is_set_pending=bool(flags & 1),
             is_schedule_running=bool(flags & 2),
             is_emergency_stop_pressed=bool(flags & 4),
             uptime_s=report["uptime_ms"] / 1000,
-            frames_bad=report["frames_bad"],
-            frames_repeated=report["frames_repeated"],
-            bytes_lost=report["bytes_lost"],
-            samples_lost=report["samples_lost"],
+            **{name: report[name] for name in _AS_REPORTED},
         )
 
     def stream(self, on: bool) -> None:

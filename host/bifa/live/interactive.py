@@ -97,20 +97,16 @@ def converse(uno: Uno, rig: Rig) -> None:
     print("type help; Tab completes; ! stops at once; Ctrl-D leaves, all valves off")
     conversation = Conversation(uno, rig)
     try:
-        _read_lines(conversation)
+        session = _prompt(conversation)
+        with patch_stdout():
+            try:
+                while True:
+                    conversation.type(session.prompt())
+            except EOFError:
+                conversation.leave()
     except KeyboardInterrupt:
         pass
     finally:
         conversation.abandon()
     if conversation.error is not None:
         raise conversation.error
-
-
-def _read_lines(conversation: Conversation) -> None:
-    session = _prompt(conversation)
-    with patch_stdout():
-        try:
-            while True:
-                conversation.type(session.prompt())
-        except EOFError:
-            conversation.leave()

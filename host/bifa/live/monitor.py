@@ -134,18 +134,14 @@ def watch(uno: Uno, clock: Clock, console: Console, duration_s: float | None, be
             uno.connect()
             begin(uno)
             uno.stream(True)
-            _follow(uno, clock, monitor, live, math.inf if duration_s is None else clock.now() + duration_s)
+            end_s, pace = math.inf if duration_s is None else clock.now() + duration_s, Pace(clock)
+            while clock.now() < end_s:
+                until_s, samples = clock.now() + REFRESH_S, []
+                while (left_s := until_s - clock.now()) > 1e-4:
+                    samples += uno.samples(left_s)
+                monitor.take(samples)
+                live.update(monitor.draw(console.width), refresh=True)
+                pace.wait()
     finally:
         if uno.counters.samples:
             console.print(monitor.draw(console.width))
-
-
-def _follow(uno: Uno, clock: Clock, monitor: Monitor, live: Live, end_s: float) -> None:
-    pace = Pace(clock)
-    while clock.now() < end_s:
-        until_s, samples = clock.now() + REFRESH_S, []
-        while (left_s := until_s - clock.now()) > 1e-4:
-            samples += uno.samples(left_s)
-        monitor.take(samples)
-        live.update(monitor.draw(live.console.width), refresh=True)
-        pace.wait()

@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -16,13 +15,14 @@ from rich.progress import Progress
 from rich.status import Status
 
 from bifa.errors import BifaError
-from bifa.link import RefusedError, Sample, StillMovingError, Uno
+from bifa.link import RefusedError, Sample, Uno
 from bifa.link.table import CHAMBERS, MARK_PAUSE
+from bifa.live.rounds import Absence
 from bifa.live.walk import raise_if_no_reader, stopped_text
 from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.printable import counted
-from bifa.rig import GONE, RETRY_S, Rig, SameBoard
+from bifa.rig import GONE, Rig, SameBoard
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
 
@@ -91,82 +91,71 @@ def record_telemetry(
 ) -> None:
     """Record a bare Uno's telemetry into `out`/telemetry_<n>.csv, a new file each time that the port comes back."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
-    if out.exists() and any(entry for entry in out.iterdir() if not entry.name.startswith("telemetry_")):
+    if out.exists() and any(not entry.name.startswith("telemetry_") for entry in out.iterdir()):
         raise RecordingError(f"{out} contains other files; choose a new folder")
     out.mkdir(parents=True, exist_ok=True)
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
-    log = _TelemetryLog(board, parameters, end_s, console, Desk(console.print))
-    waiting = "recording resumes when that Uno is back" + (
-        "; you are asked before it walks (Ctrl-C ends)" if parameters else " (Ctrl-C ends)"
-    )
-    is_told = False
+    log = _TelemetryLog(board, out, parameters, end_s, console)
     try:
         with locked(out):
             while time.monotonic() < end_s:
-                path = next_file(out)
-                try:
-                    log.record_until_gone(path)
-                except GONE as error:
-                    if isinstance(error.__cause__, KeyboardInterrupt) or not log.has_begun:
-                        raise
-                    if isinstance(error, StillMovingError):
-                        log.unconfirmed = error
-                    if path.exists() or not is_told:
-                        console.print(f"{error}\nwhat was recorded is in {out}; {waiting}", soft_wrap=True)
-                        is_told = True
-                    time.sleep(RETRY_S)
+                with log.absence.waited_out():
+                    log.record_until_gone()
     except KeyboardInterrupt:
         console.print("ended")
-    if log.unconfirmed is not None:
-        raise log.unconfirmed
+    if log.absence.unconfirmed is not None:
+        raise log.absence.unconfirmed
     console.print(f"{out} holds the telemetry; a data set also needs the displacement from your own instrument")
 
 
-@dataclass
 class _TelemetryLog:
-    """Recorder for one particular board, which walks without being asked only the first time. `unconfirmed`: the error
-    of a stop that was not confirmed, until the board is back."""
+    """Recorder for one particular board, which walks without being asked only the first time."""
 
-    _board: SameBoard
-    _parameters: dict[str, float]
-    _end_s: float
-    _console: Console
-    _desk: Desk
-    unconfirmed: StillMovingError | None = None
-    _nonce: int | None = None  # boot number of the last start that was seen; None before the first
+    def __init__(
+        self, board: SameBoard, out: Path, parameters: dict[str, float], end_s: float, console: Console
+    ) -> None:
+        self._board, self._out, self._parameters, self._end_s = board, out, parameters, end_s
+        self._console, self._desk = console, Desk(console.print)
+        self._nonce: int | None = None  # boot number of the last start that was seen; None before the first
+        self._is_told = False
+        self.absence = Absence(lambda: self._nonce is not None, self._tell)
 
-    @property
-    def has_begun(self) -> bool:
-        """Whether the Uno has ever answered."""
-        return self._nonce is not None
+    def _tell(self, error: Exception) -> None:
+        """Say once, and again after every further file, that the board is gone."""
+        if self._path.exists() or not self._is_told:
+            ask = "; you are asked before it walks" if self._parameters else ""
+            waiting = f"recording resumes when that Uno is back{ask} (Ctrl-C ends)"
+            self._console.print(f"{error}\nwhat was recorded is in {self._out}; {waiting}", soft_wrap=True)
+            self._is_told = True
 
-    def record_until_gone(self, path: Path) -> None:
-        """Record into the new file `path`; raises one of GONE when the link to the Uno is lost."""
+    def record_until_gone(self) -> None:
+        """Record into a new file; raises one of GONE when the link to the Uno is lost."""
+        self._path = next_file(self._out)
         uno: Uno | None = None
         try:
             with self._board.open() as rig, self._console.status("waiting for the Uno") as status:
                 uno = Uno(rig.transport, rig.clock)
                 with uno:
-                    is_back, known = self.has_begun, self._greet(uno)
+                    is_back, known = self._nonce is not None, self._greet(uno)
                     if self._parameters:
                         uno.upload(self._parameters)
                     uno.clock_relation.estimate(0.0)  # its first use imports for longer than `host_timeout_s` may be
                     uno.stream(True)
                     marked = uno.mark_strobe()
-                    with telemetry_file(path) as file:
+                    with telemetry_file(self._path) as file:
                         writer = csv.writer(file)
                         writer.writerow(HEADER)
                         if self._parameters:
                             self._ask(known) if is_back else uno.run()
                         self._record(uno, writer, file, status, marked)
         finally:
-            if uno is not None and path.exists():
-                self._console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)
+            if uno is not None and self._path.exists():
+                self._console.print(f"{self._path}: {uno.counters.text()}", soft_wrap=True)
 
     def _greet(self, uno: Uno) -> str:
         """Connect; return in words whether this is known to be the board that was recorded before."""
         nonce = uno.connect().boot_nonce
-        self.unconfirmed = None
+        self.absence.unconfirmed = None
         followed = self._nonce is not None and 0 <= (nonce - self._nonce) % 65536 <= MAX_RESTARTS
         self._nonce = nonce
         if self._board.serial_number or followed:

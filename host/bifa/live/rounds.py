@@ -1,8 +1,13 @@
-"""What every live view does each round: keep the rig in step with the wall clock, and note how old the data are."""
+"""What every live view does each round: keep the rig in step with the wall clock, note how old the data are, and wait
+for a board that has vanished."""
 
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 
-from bifa.link import Clock, Sample, Uno
+from bifa.link import Clock, Sample, StillMovingError, Uno
+from bifa.rig import GONE, RETRY_S
 
 LARGEST_LAG_S = 0.2
 STALE_S = 1.0
@@ -48,3 +53,26 @@ class Latest:
         """A warning if telemetry has stopped; empty while it flows."""
         silence_s = time.monotonic() - self._taken_s
         return f"no telemetry for {silence_s:.0f} s" if silence_s > STALE_S else ""
+
+
+@dataclass
+class Absence:
+    """Waiting for a board to come back, as long as `is_awaited()`; `tell(error)` says that it is gone. `unconfirmed`:
+    the error of a stop that was not confirmed, which whoever connects again sets to None."""
+
+    is_awaited: Callable[[], bool]
+    tell: Callable[[Exception], None]
+    unconfirmed: StillMovingError | None = None
+
+    @contextmanager
+    def waited_out(self) -> Iterator[None]:
+        """If the board vanishes in the block, return after a while; the caller then tries again."""
+        try:
+            yield
+        except GONE as error:
+            if isinstance(error.__cause__, KeyboardInterrupt) or not self.is_awaited():
+                raise
+            if isinstance(error, StillMovingError):
+                self.unconfirmed = error
+            self.tell(error)
+            time.sleep(RETRY_S)

@@ -17,8 +17,8 @@ from bifa.errors import BifaError
 from bifa.link import LinkError, PortGoneError, RefusedError, Uno
 from bifa.measure.desk import Desk, NobodyError
 from bifa.measure.experiments import Progress, record_trial
-from bifa.measure.own_instruments import OwnInstruments, Turn
-from bifa.measure.plan import PlannedTrial
+from bifa.measure.own_instruments import OwnInstruments
+from bifa.measure.plan import Turn
 from bifa.measure.recording import Bench, idle
 from bifa.measure.text_plot import text_plot
 from bifa.rig import Rig
@@ -44,45 +44,30 @@ class ByHand:
         self._instruments = OwnInstruments(desk, watch, exports)
         self.before: Callable[[], None] = lambda: None
 
-    def __call__(
-        self,
-        rig: Rig,
-        uno: Uno,
-        planned: PlannedTrial,
-        on_progress: Progress,
-        *,
-        number: int,
-        total: int,
-        writer: DatasetWriter,
-    ) -> Trial:
+    def __call__(self, rig: Rig, uno: Uno, turn: Turn, on_progress: Progress, writer: DatasetWriter) -> Trial:
         """Record one trial, repeated until the person keeps it; see session.Recorder.
 
         Raises KeyboardInterrupt if the answer is a stop.
         """
         self.before()
-        turn = Turn(planned, number, total)
         self._instruments.begin(turn, writer.partial / RAW)
+        bench = Bench(self._instruments, rig.clock)
         try:
-            return self._until_kept(Bench(self._instruments, rig.clock), uno, turn, on_progress, writer)
+            while True:
+                self._desk.say(f"\nTrial {turn.number} of {turn.total}: {turn.planned.title}")
+                try:
+                    trial = record_trial(bench, uno, turn.planned, on_progress, attempts=1)
+                except BifaError as error:
+                    is_refused = isinstance(error, RefusedError)  # a LinkError that the person can do something about
+                    if isinstance(error, (LinkError, PortGoneError, NobodyError)) and not is_refused:
+                        raise
+                    self._try_again(bench, uno, turn, error)
+                    continue
+                if self._accepted(bench, uno, turn, trial, writer):
+                    self._instruments.keep(writer.partial / RAW)
+                    return trial
         finally:
             self._desk.clear()
-
-    def _until_kept(self, bench: Bench, uno: Uno, turn: Turn, on_progress: Progress, writer: DatasetWriter) -> Trial:
-        while True:
-            self._desk.say(f"\nTrial {turn.number} of {turn.total}: {turn.planned.title}")
-            try:
-                trial = record_trial(bench, uno, turn.planned, on_progress, attempts=1)
-            except RefusedError as error:
-                self._try_again(bench, uno, turn, error)
-                continue
-            except (LinkError, PortGoneError, NobodyError):
-                raise
-            except BifaError as error:
-                self._try_again(bench, uno, turn, error)
-                continue
-            if self._accepted(bench, uno, turn, trial, writer):
-                self._instruments.keep(writer.partial / RAW)
-                return trial
 
     def _try_again(self, bench: Bench, uno: Uno, turn: Turn, error: BifaError) -> None:
         """Say why a trial is not usable, until the person wants to try again and nothing forbids that any longer."""

@@ -13,7 +13,6 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent import futures
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from bifa.files import is_stray
 from bifa.measure.desk import ANSWER, ASKS, Desk
 from bifa.measure.instrument_csv import InstrumentFileError, read_instrument, sync_file
 from bifa.measure.instruments import CHANNELS
-from bifa.measure.plan import PULL_MM, PlannedTrial
+from bifa.measure.plan import PULL_MM, Turn
 
 Signature = tuple[Any, ...]
 _Record = tuple[Path, dict[str, np.ndarray]]
@@ -43,34 +42,6 @@ _STAND = {
 }
 
 
-@dataclass(frozen=True)
-class Turn:
-    """The trial being recorded: `number` of `total`."""
-
-    planned: PlannedTrial
-    number: int
-    total: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the trial as plain values for `next.toml`."""
-        planned, trial = self.planned, self.planned.as_trial()
-        settings: dict[str, Any] = {
-            "actuator": planned.actuator,
-            "pressure_psi": planned.pressure_psi,
-            "rate_mm_s": planned.rate_mm_s,
-        }
-        settings |= {"gait": trial.gait, "cycles": planned.cycles or None, **planned.settings}
-        known = {key: value for key, value in settings.items() if value is not None}
-        return {
-            "trial": self.number,
-            "of": self.total,
-            "file": planned.file,
-            "experiment": planned.experiment,
-            "repeat": planned.repeat,
-            "settings": known,
-        }
-
-
 class OwnInstruments:
     """`AskedInstruments` operated by the person at `desk`. `watch`: the folder where their files appear, if any.
     `exports()` returns how the files are written; it is called again while waiting for a record."""
@@ -79,6 +50,7 @@ class OwnInstruments:
         self, desk: Desk, watch: Path | None = None, exports: Callable[[], Mapping[str, Export]] = dict
     ) -> None:
         self._desk, self._watch, self._exports = desk, watch, exports
+        self.attend, self.tell = desk.attend, desk.count_down
         self._declared: Mapping[str, Export] = {}
         self._before: dict[Path, Signature] = {}
         self._wrong = ""
@@ -152,14 +124,6 @@ class OwnInstruments:
             return False
         self._step = ""
         return True
-
-    def attend(self) -> None:
-        """See AskedInstruments."""
-        self._desk.attend()
-
-    def tell(self, what: str, left_s: float) -> None:
-        """See AskedInstruments."""
-        self._desk.count_down(what, left_s)
 
     def save(self) -> None:
         """See AskedInstruments."""

@@ -83,6 +83,24 @@ class PlannedTrial:
         )
 
 
+@dataclass(frozen=True)
+class Turn:
+    """The trial being recorded: `number` of `total`."""
+
+    planned: PlannedTrial
+    number: int
+    total: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the trial as plain values for `next.toml`."""
+        planned, trial = self.planned, self.planned.as_trial()
+        settings = {key: getattr(trial, key) for key in ("actuator", "pressure_psi", "rate_mm_s", "gait")}
+        settings |= {"cycles": planned.cycles or None, **planned.settings}
+        known = {key: value for key, value in settings.items() if value is not None}
+        named = {key: getattr(trial, key) for key in ("file", "experiment", "repeat")}
+        return {"trial": self.number, "of": self.total, **named, "settings": known}
+
+
 def walks(file: GaitFile, repeats: int, **fields: Any) -> tuple[PlannedTrial, ...]:
     """Plan walks with a gait file's gait and its other parameters; `fields` are passed to PlannedTrial."""
     pressure_psi = file.others.get("pressure_psi")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import bifa
 from bifa.check.lag import trial_misfit
@@ -18,47 +18,32 @@ from bifa.data import Dataset, DatasetError, DatasetWriter, Trial
 from bifa.link import Uno
 from bifa.link.session import Counters
 from bifa.lock import locked
-from bifa.measure.experiments import record_trial
-from bifa.measure.plan import PlannedTrial
+from bifa.measure.experiments import Progress, record_trial
+from bifa.measure.plan import PlannedTrial, Turn
 from bifa.measure.recording import bench_of
 from bifa.printable import counted
 from bifa.rig import Rig
 
 
 @dataclass(frozen=True)
-class Event:
-    """Progress of a session: `share` of trial `number` of `total` is done. For a finished trial also the `trial`, the
-    `link` counters over its duration, and a description of its displacement's lag if that does not match the earlier
-    trials (`misfit`)."""
+class Event(Turn):
+    """Progress of a session: `share` of the trial is done. For a finished trial also the `trial`, the `link` counters
+    over its duration, and a description of its displacement's lag if that does not match the earlier trials (`misfit`).
+    """
 
-    planned: PlannedTrial
-    number: int
-    total: int
-    share: float
+    share: float = 0.0
     trial: Trial | None = None
     link: Counters | None = None
     misfit: str | None = None
 
 
-class Recorder(Protocol):
-    """Records one planned trial, `number` of `total`, for the data set that `writer` is writing."""
-
-    def __call__(
-        self,
-        rig: Rig,
-        uno: Uno,
-        planned: PlannedTrial,
-        on_progress: Callable[[float], None],
-        *,
-        number: int,
-        total: int,
-        writer: DatasetWriter,
-    ) -> Trial: ...
+# Records one planned trial for the data set that the writer is writing.
+Recorder = Callable[[Rig, Uno, Turn, Progress, DatasetWriter], Trial]
 
 
-def unattended(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
+def unattended(rig: Rig, uno: Uno, turn: Turn, on_progress: Progress, writer: DatasetWriter) -> Trial:
     """The `Recorder` of a rig whose instruments run unattended."""
-    return record_trial(bench_of(rig), uno, planned, on_progress)
+    return record_trial(bench_of(rig), uno, turn.planned, on_progress)
 
 
 def run_session(
@@ -89,14 +74,13 @@ def run_session(
             for number, planned in enumerate(trials, start=1):
                 if writer.has(planned.as_trial()):
                     continue
-                before, event = replace(uno.counters), Event(planned, number, len(trials), 0.0)
+                before, event = replace(uno.counters), Event(planned, number, len(trials))
                 on_event(event)
 
                 def on_progress(share: float, event: Event = event) -> None:
                     on_event(replace(event, share=share))
 
-                recorder = record or unattended
-                trial = recorder(rig, uno, planned, on_progress, number=number, total=len(trials), writer=writer)
+                trial = (record or unattended)(rig, uno, event, on_progress, writer)
                 writer.add(replace(trial, session_order=number))
                 link, misfit = uno.counters.since(before), trial_misfit(trial, writer.trials[:-1])
                 on_event(replace(event, share=1.0, trial=trial, link=link, misfit=misfit))

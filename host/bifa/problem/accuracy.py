@@ -33,8 +33,7 @@ def accuracies(texts: Iterable[str]) -> dict[str, float]:
 
 
 def accuracy_of(channel: str, accuracies: Mapping[str, float]) -> float:
-    """The accuracy of a channel (displacement_head_mm is a displacement_mm); 0 if none was given, so that only the
-    noise counts."""
+    """The accuracy of a channel (displacement_head_mm is a displacement_mm); 0, only noise counts, if none is given."""
     return next((v for q, v in accuracies.items() if is_of(channel, q)), 0.0)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -34,9 +34,8 @@ Given = TypeVar("Given", bound="Inputs", covariant=True)
 
 @dataclass(frozen=True)
 class RobotInTrial(Generic[Given]):
-    """One robot in a trial. `inputs`: those that reach the robot (learnt curves may alter the trial's); `zeros_m`:
-    contracted equilibrium of K for the body and a small actuator; `nuisances`: values that may include the trial's
-    nuisances."""
+    """One robot in a trial. `inputs`: those that reach it (learnt curves may alter the trial's); `zeros_m`: contracted
+    equilibrium of K for the body and a small actuator; `nuisances`: a mapping with the trial's."""
 
     inputs: Given
     plant: Plant
@@ -52,30 +51,6 @@ class RobotInTrial(Generic[Given]):
     def zero_m(self) -> float:
         """Contracted equilibrium of the actuator on its stand, in m."""
         return self.zeros_m[self.inputs.actuator == "small"]
-
-
-class Inputs(Protocol):
-    """Inputs of a trial. `channels`: names of the predicted channels. `actuator`: "large" or "small"; None if the trial
-    does not test a single actuator. `positive_psi`: the positive supply of a walk if the trial sets its own. `bench`:
-    trials with equal values are simulated side by side."""
-
-    @property
-    def channels(self) -> tuple[str, ...]: ...
-
-    @property
-    def actuator(self) -> str | None: ...
-
-    @property
-    def positive_psi(self) -> float | None: ...
-
-    @property
-    def bench(self) -> Hashable: ...
-
-    @staticmethod
-    def simulate(cases: Sequence[RobotInTrial[Any]], tolerance_m: float, together: bool) -> list[Columns]:
-        """Simulate cases of one bench. Returns the channels of each, of shape (n,). `together`: see
-        `bifa.simulate.walks`."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -158,8 +133,8 @@ class StepInputs:
 
 @dataclass(frozen=True)
 class PullInputs:
-    """Inputs of an anchor pull. `extended_psi`: pressure at which the head was extended first, if that is more than
-    `pressure_psi`; `grip`: factor of the friction coefficients, (n,) or one for all samples."""
+    """Inputs of an anchor pull. `pulled_s`, (n,): how long the puller has moved; `extended_psi`: pressure at which the
+    head was extended first, if above `pressure_psi`; `grip`: factor of the friction coefficients, (n,) or one."""
 
     pulled_s: np.ndarray
     rate_mm_s: float
@@ -198,11 +173,9 @@ class PullInputs:
         ]
 
     def _force(self, record: SimulatedTrial, nuisances: Theta) -> np.ndarray:
-        """The resistance, with the transition from the load cell's pull to sliding spread over one sample.
-
-        A peak between two samples is known only to lie there. If the prediction jumped, a small change of a parameter
-        would not move the peak, and derivatives could not find mu_s.
-        """
+        """The resistance, with the transition from the load cell's pull to sliding spread over one sample: a peak
+        between two samples is known only to lie there, and if the prediction jumped, a small change of a parameter
+        would not move it, so that derivatives could not find mu_s."""
         late_s = nuisances.get("slip_late_s", 0.0)
         # until the head slips, the load cell's pull is proportional to its stiffness
         wound = record["wound_N"] * (nuisances.get(LOAD_CELL, self.load_cell_N_m) / self.load_cell_N_m)
@@ -246,6 +219,13 @@ class WalkInputs:
         return [record.columns for record in records]
 
 
+# Inputs of a trial. `channels`: names of the predicted channels. `actuator`: "large" or "small"; None if the trial does
+# not test a single actuator. `positive_psi`: the positive supply of a walk if the trial sets its own. `bench`: trials
+# with equal values are simulated side by side, by `simulate`, which returns the channels of each, of shape (n,)
+# (`together`: see `bifa.simulate.walks`).
+Inputs = StaticInputs | StepInputs | PullInputs | WalkInputs
+
+
 def inputs_of(trial: Trial) -> Inputs:
     """Derive the inputs of a recorded trial."""
     return _MAKERS[trial.experiment](trial)
@@ -282,20 +262,14 @@ def _step(trial: Trial) -> StepInputs:
 def _pull(trial: Trial) -> PullInputs:
     rate = abs(trial.commanded_mm_s)
     backward = trial.extra.get("direction") == "backward"
-    pulled_mm = np.abs(trial.columns["displacement_mm"])
+    path_m = imposed_motion(_time_s(trial), np.abs(trial.columns["displacement_mm"]) / _MM).displacement_m
     return PullInputs(
-        pulled_s=_pulled_time(_time_s(trial), pulled_mm, rate),
+        pulled_s=np.maximum.accumulate(np.clip(path_m * _MM / rate, 0.0, None)),
         rate_mm_s=-rate if backward else rate,
         pressure_psi=_pressure_psi(trial),
         load_cell_N_m=float(trial.extra.get(LOAD_CELL, simulate.records.LOAD_CELL_N_M)),
         extended_psi=float(trial.extra.get("extended_psi", 0.0)),
     )
-
-
-def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) -> np.ndarray:
-    """How long the puller has been moving: the pulled distance over the rate; shape (n,), nondecreasing."""
-    path_m = imposed_motion(time_s, pulled_mm / _MM).displacement_m
-    return np.maximum.accumulate(np.clip(path_m * _MM / rate_mm_s, 0.0, None))
 
 
 def _walk(trial: Trial) -> WalkInputs:

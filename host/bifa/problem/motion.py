@@ -28,12 +28,10 @@ class ImposedMotion(NamedTuple):
 
 
 def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> ImposedMotion:
-    """Reconstruct the imposed motion from its measured displacement.
-
-    The path of a cross-head driven at constant rates consists of straight lines that meet where it starts, reverses and
-    stops; fitting them is more accurate than any smoothing. If they do not fit, each stretch in one direction is
-    smoothed separately. A noise-free ramp is returned unchanged.
-    """
+    """Reconstruct the imposed motion from its measured displacement. The path of a cross-head driven at constant rates
+    is straight lines that meet where it starts, reverses and stops; fitting them is more accurate than any smoothing.
+    If they do not fit, each stretch in one direction is smoothed separately. A noise-free ramp is returned
+    unchanged."""
     displacement_m = np.asarray(displacement_m, float)
     n = len(displacement_m)
     if n < 3:
@@ -50,9 +48,8 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> ImposedMot
 
 
 def moving_line(values: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
-    """Level and slope (per sample) of the straight line fitted to the `window` values (an odd number) around each of
-    `values` (n,); near the ends, of the line through the outermost window. This is a Savitzky-Golay filter of degree 1;
-    SciPy's takes half a second to import."""
+    """Level and slope (per sample) of the line fitted to the `window` values (an odd number) around each of `values`
+    (n,); near the ends, of the outermost window. SciPy's (Savitzky-Golay, degree 1) takes half a second to import."""
     half = window // 2
     around, offset = sliding_window_view(values, window), np.arange(window) - half
     level, slope = around.mean(axis=1), around @ offset / (offset @ offset)
@@ -64,8 +61,7 @@ def moving_line(values: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray
 
 
 def _fit_lines(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> ImposedMotion | None:
-    """The motion as straight lines; None if it does not consist of such lines, that is, if their residuals exceed the
-    noise estimated from differences of adjacent samples."""
+    """The motion as straight lines; None if their residuals exceed the noise (by differences of adjacent samples)."""
     stretches = _stretches(direction)
     if any(stop - start < 2 * _MARGIN + 3 for start, stop in stretches if direction[start]):
         return None
@@ -107,8 +103,7 @@ def _line(time_s: np.ndarray, displacement_m: np.ndarray, start: int, stop: int,
 
 
 def _sharpened(displacement_m: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Place an immediate reversal exactly at the sample where the displacement turns, where the window that detects the
-    direction shows a short rest."""
+    """Place a reversal where the displacement turns; the direction's window shows a short rest there instead."""
     for start, stop in _stretches(direction)[1:-1]:
         before, after = direction[start - 1], direction[stop]
         if direction[start] == 0 and before == -after and stop - start <= _DIRECTION_WINDOW:

@@ -31,8 +31,7 @@ _MIN_POINTS = 4 * (DEGREE + 1)
 
 
 class UndeterminedError(BifaError):
-    """A parameter cannot be determined from this data set; the text says which, and which experiment would determine
-    it."""
+    """A parameter cannot be determined from this data set; the text says which, and which experiment would help."""
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,7 @@ class StiffnessFit:
 
     def unstable_m(self) -> float:
         """The unstable equilibrium (the threshold of eq. (3)), where K falls through 0 between the stable states.
-
-        Raises UndeterminedError if there is none.
-        """
+        Raises UndeterminedError if there is none."""
         x = np.linspace(*self.covered_m, 2001)
         force = self.force(x)
         falling = np.flatnonzero((force[:-1] > 0) & (force[1:] <= 0))
@@ -122,14 +119,11 @@ def fit_stiffness(
     *,
     reach_m: tuple[float, float] | None = None,
 ) -> StiffnessFit:
-    """Fit K to static data at 0 psi. Loading and unloading have equal weights at every displacement that both cover, so
-    that the curve runs through the middle of the hysteresis loop.
-
-    displacement_m, force_N: shape (n,); loading: shape (n,), True while extending.
-    reach_m: the least and greatest displacement at which the curve will be evaluated, if known.
-
-    Raises UndeterminedError if there are too few points, their range is too small, or the force never changes.
-    """
+    """Fit K to static data at 0 psi: displacements, forces, and whether the actuator was being extended, each of shape
+    (n,). Loading and unloading have equal weights at every displacement that both cover, so that the curve runs through
+    the middle of the hysteresis loop. `reach_m`: the least and greatest displacement at which the curve will be
+    evaluated, if known. Raises UndeterminedError if there are too few points, their range is too small, or the force
+    never changes."""
     x, force = np.asarray(displacement_m, float), np.asarray(force_N, float)
     if len(x) < _MIN_POINTS:
         raise UndeterminedError(f"a curve of degree {DEGREE} needs at least {_MIN_POINTS} points, not {len(x)}")
@@ -169,8 +163,7 @@ def fit_stiffness(
 
 
 def _rows(x: np.ndarray, lower: float, upper: float, derivative: int = 0) -> np.ndarray:
-    """The Chebyshev polynomials (or their derivatives with respect to x) at x, shape (n, 16), with the model's straight
-    continuation beyond the ends."""
+    """Chebyshev polynomials at x (or derivatives by x), shape (n, 16), continued straight beyond the ends."""
     to_z = 2.0 / (upper - lower)
     x = np.atleast_1d(np.asarray(x, float))
     inside = np.clip(x, lower, upper)

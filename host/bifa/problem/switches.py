@@ -17,14 +17,13 @@ from bifa.data import Trial
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
 from bifa.simulate import Timeline, of_gait, of_samples, recorded_commands, refine, timeline, vented_between
-from bifa.simulate.timeline import COMMANDS
+from bifa.simulate.stepper import POSITIVE
 
 _SPARE_S = 1e-6  # tolerance for times that coincide with a sample
 
 
 def elapsed_s(trial: Trial) -> np.ndarray:
-    """Time since the trial began: its own time axis if that begins within 1.5 samples after 0, else the time since the
-    first sample."""
+    """Time since the trial began: its own times if these begin within 1.5 samples after 0, else since the first one."""
     begin_s, sample_s = trial.time_s[0], np.median(np.diff(trial.time_s))
     return trial.time_s if 0.0 <= begin_s < 1.5 * sample_s else trial.time_s - begin_s
 
@@ -39,7 +38,7 @@ def shifted(commands: Timeline, late_s: float) -> Timeline:
 
 def delayed(commands: Timeline, to_vacuum_s: float, to_positive_s: float) -> Timeline:
     """Delay the switches to vacuum and to positive pressure. The result is not sorted; the simulation does that."""
-    delay_s = np.where(commands.command == COMMANDS["positive"], to_positive_s, to_vacuum_s)
+    delay_s = np.where(commands.command == POSITIVE, to_positive_s, to_vacuum_s)
     return Timeline(commands.time_s + delay_s, commands.chamber, commands.command)
 
 
@@ -96,8 +95,7 @@ def walk_timeline(trial: Trial) -> Timeline:
 
 
 def _with_times(recorded: Timeline, noted: dict[str, Sequence[float]]) -> Timeline:
-    """The recorded switches with the n-th switch of each chamber at its declared time; the first entry of each chamber
-    is its state at time 0."""
+    """The recorded switches, the n-th of each chamber at its declared time; its first entry is its state at time 0."""
     time_s = recorded.time_s.copy()
     for chamber, name in enumerate(CHAMBERS):
         mine = np.flatnonzero(recorded.chamber == chamber)[1:]
@@ -109,8 +107,7 @@ def _with_times(recorded: Timeline, noted: dict[str, Sequence[float]]) -> Timeli
 
 def _settled(gait: Gait, recorded: Timeline, time_s: np.ndarray, ahead_s: float, error_s: float) -> Timeline | None:
     """The switches of a settled gait that has run for `ahead_s` at time 0, shifted as a whole by the least amount that
-    agrees with the record if each switch may be off by `error_s`. None if they do not agree with the recorded switches
-    to a sample."""
+    agrees with the record if each may be off by `error_s`. None if they disagree by more than a sample."""
     sample_s = float(np.median(np.diff(time_s)))
     ideal = of_gait(gait, float(time_s[-1]) + sample_s, 2.0 * np.pi * ahead_s / gait.period_s)
     low, high = -np.inf, np.inf

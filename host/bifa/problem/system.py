@@ -17,13 +17,12 @@ import numpy as np
 
 from bifa import robot
 from bifa.data import Dataset, DatasetError, Trial
+from bifa.effects import EffectParameter, PhysicalEffect, library
 from bifa.errors import BifaError
 from bifa.problem import candidates, regressors, sites
 from bifa.problem.accuracy import accuracy_of
 from bifa.problem.curves import FittedCurve
 from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK, Columns, Inputs, RobotInTrial, inputs_of
-from bifa.problem.library import engine_effects
-from bifa.problem.spare import spare
 from bifa.problem.unmeasured import BENCH, LOAD_CELL, PRIOR_SD, STAND_MASS
 from bifa.robot import Model
 from bifa.simulate import Plant, lanes, layout
@@ -39,6 +38,7 @@ from lacuna.system import (
     Record,
     System,
     Theta,
+    no_prediction,
 )
 
 _CACHES = ("_plant", "_own_values", "_unfitted", "_shapes")  # cached attributes of a system, not pickled
@@ -55,6 +55,7 @@ PIPE = ("wall_offset_m", "mu_s", "mu_k")
 _PLACES = {"wall_offset_m": (0.017, 0.022, 0.026, 0.031)}
 _SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
 _WALL = ("wall_stiffness_N_m", "wall_damping_Ns_m")
+CURVE_OF = {"large": "body", "small": "small"}  # prefix of an actuator's parameters, and the name of its curve
 _MACHINE = {"displacement_mm": "the cross-head", "force_N": "the load cell"}  # what a testing machine measures
 _MASSES = ("head_mass_kg", "tail_mass_kg", "small_mass_kg")
 _BENCH_TRIALS = {STAND_MASS: (STEP, "large"), LOAD_CELL: (ANCHOR, None)}
@@ -67,16 +68,19 @@ _DEPENDENCIES: dict[tuple[str, str | None], frozenset[str]] = {
     (ANCHOR, None): frozenset({"small_area_N_psi", "head_segment_mass_kg", "wall_stiffness_N_m", *PIPE}),
     (WALK, None): frozenset({*_LARGE, *_SMALL, *PIPE, *_SUPPLIES, *_MASSES, *_WALL}),
 }
+# By experiment: the quantity that is varied, and the least number of settings from which one is never fitted.
+_VARIED: dict[str, tuple[Callable[[Trial], float], int]] = {
+    STATIC: (lambda trial: trial.commanded_psi, 3),
+    STEP: (lambda trial: trial.commanded_psi, 2),
+    ANCHOR: (lambda trial: trial.commanded_psi, 3),
+    WALK: (lambda trial: trial.walked["period_s"], 3),
+}
 
 
 class RobotSystem(System):
-    """The robot's base model, its library of effects, and the trials of a data set.
-
-    model: initial values of the fitted parameters, and values of the others.
-    curves: the fitted stiffness curves, "body" and "small"; their shapes are parameters. An actuator without one keeps
-        the model's curve.
-    fitted: names of the model's parameters to be fitted.
-    """
+    """The robot's base model, its library of effects, and the trials of a data set. `model`: initial values of the
+    parameters `fitted`, and values of the others. `curves`: the fitted stiffness curves, "body" and "small", whose
+    shapes are parameters; an actuator without one keeps the model's curve."""
 
     name = "pipe robot"
 
@@ -153,7 +157,7 @@ class RobotSystem(System):
                 if channels:
                     seen = sites.corrected_readings(dict(channels), learnt[k], case.inputs, case.plant)
                     found[k] = {name: seen[name] for name in trials[k].channels}
-        return [found[k] if k in found else _nan_channels(trial) for k, trial in enumerate(trials)]
+        return [found[k] if k in found else no_prediction(trial) for k, trial in enumerate(trials)]
 
     def _case(
         self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record
@@ -200,7 +204,7 @@ class RobotSystem(System):
         if "_shape_" not in parameter:
             return parameter in _DEPENDENCIES[trial.experiment, actuator]
         prefix = parameter.split("_", 1)[0]
-        if actuator is not None and prefix != {"large": "body", "small": "small"}[actuator]:
+        if actuator is not None and prefix != CURVE_OF[actuator]:
             return False
         if trial.experiment == ANCHOR and prefix == "body":
             return False
@@ -278,8 +282,7 @@ class RobotSystem(System):
 
 
 def _refuse_dead_machine(dataset: Dataset) -> None:
-    """Raise DatasetError if a channel of the testing machine never changes: a cross-head always moves, and a fit would
-    attribute a dead load cell to the robot."""
+    """Raise DatasetError if a testing machine's channel never changes: a fit would blame the robot."""
     for trial in (*dataset.of(STATIC), *dataset.of(ANCHOR)):
         for column, instrument in _MACHINE.items():
             if np.ptp(values := trial.columns[column]) == 0.0:
@@ -299,16 +302,13 @@ def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, 
 
 def _simulated(cases: Sequence[RobotInTrial[Inputs]], tolerance_m: float, alike: bool) -> list[Columns]:
     """Simulate the cases of one bench. Returns the channels of each, empty if it is out of range."""
+    simulate: Callable[..., list[Columns]] = cases[0].inputs.simulate
     try:
-        return cases[0].inputs.simulate(cases, tolerance_m, alike)
+        return simulate(cases, tolerance_m, alike)
     except BifaError:
         if len(cases) == 1:
             return [{}]
         return [_simulated([case], tolerance_m, alike)[0] for case in cases]
-
-
-def _nan_channels(trial: Record) -> Channels:
-    return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
 
 
 def _picked(names: Sequence[str]) -> Callable[[Theta], tuple[float, ...]]:
@@ -340,3 +340,52 @@ def _plant_in_trial(plant: Plant, trial: Record, theta: Theta, positive_psi: flo
     if trial.experiment == STEP:
         q[layout.BODY + layout.MASS] = theta.get(STAND_MASS, q[layout.BODY + layout.MASS])
     return plant._replace(q=q)
+
+
+def spare(dataset: Dataset) -> tuple[tuple[str, Hashable], ...]:
+    """Select the held-out conditions, as (experiment, condition): for each experiment and actuator, those with the
+    middle pressure or period (the lower of two), at every rate."""
+    groups: dict[tuple[str, str | None], list[Trial]] = defaultdict(list)
+    for trial in dataset.trials:
+        groups[trial.experiment, trial.actuator].append(trial)
+    found: dict[tuple[str, Hashable], None] = {}
+    for (experiment, _), trials in groups.items():
+        setting, fewest = _VARIED[experiment]
+        levels = sorted({setting(trial) for trial in trials})
+        if len(levels) >= fewest:
+            middle = levels[(len(levels) - 1) // 2]
+            found |= dict.fromkeys((experiment, t.condition) for t in trials if setting(t) == middle)
+    return tuple(found)
+
+
+def engine_effects() -> dict[str, Effect]:
+    """All effects of `bifa.effects`, with their sizes first among the parameters."""
+    return {name: _engine_effect(effect) for name, effect in library().items()}
+
+
+def _engine_effect(effect: PhysicalEffect) -> Effect:
+    ordered = sorted((p for p in effect.parameters if not p.own), key=lambda p: not p.size)
+    return Effect(
+        name=effect.name,
+        parameters=tuple(_engine_parameter(p) for p in ordered),
+        enters=effect.enters,
+        experiments=effect.experiments,
+        equation=effect.equation,
+        source=effect.source,
+        sizes=len(effect.sizes),
+        own=tuple(_engine_parameter(p) for p in effect.parameters if p.own),
+        freed_at=effect.freed_at,
+        apart=effect.apart,
+        frequency=next((p.name for p in effect.parameters if p.frequency), None),
+    )
+
+
+def _engine_parameter(p: EffectParameter) -> Parameter:
+    lower, upper = p.lower, p.upper
+    # a trial's own value may be anywhere within its bounds
+    scale = 0.25 * (upper - lower) if p.own else 0.3 * abs(p.typical) or 0.05 * (upper - lower)
+    if p.period is not None:
+        lower, upper = p.typical - 0.5 * p.period, p.typical + 0.5 * p.period
+    return Parameter(
+        p.name, p.unit, p.typical, lower, upper, scale=scale, source=p.meaning, periodic=p.period is not None
+    )

@@ -18,7 +18,6 @@ LENGTH_MM = 186.0  # from tail to head when contracted: 240 mm extended less the
 ANCHORED_MM, FREE_MM = PIPE_MM, 0.72 * PIPE_MM
 _BODY_MM, _END_MM, _WALL_MM = 52.0, 24.0, 4.0
 _MARGIN_MM, _LABEL_MM, _RULER_MM = 16.0, 46.0, 46.0
-_GROUND = '<rect width="100%" height="100%" fill="var(--paper)"/>'
 _NOMINAL_WIDTH_MM = 640.0  # width up to which lettering has its nominal size; in wider pictures it grows with them
 
 
@@ -61,21 +60,23 @@ def animate_walks(
             drawn.append(f'<rect class="{name}" {box} fill="var(--{part})"/>')
     bottom = len(lanes) * lane_mm
     ruler, clock = bottom + 8 * zoom, bottom + ruler_mm + 8 * zoom
-    drawn += [_ruler(ruler, left + origin_mm, far_mm, zoom), _clock(clock, width, frames_s, zoom)]
+    long, lasts_s = width - 2 * _MARGIN_MM, frames_s[-1] - frames_s[0]
+    drawn += [
+        _scale(ruler, left + origin_mm, far_mm, far_mm, 12, "mm", zoom),
+        _scale(clock, _MARGIN_MM, long, lasts_s, 10, "s", zoom),
+        f'<circle class="walk-clock" r="{6 * zoom:.1f}" fill="var(--ink)"/>',
+    ]
     ends = [f"translate({x:.1f}px,{clock:.0f}px)" for x in (_MARGIN_MM, width - _MARGIN_MM)]
     rules.append(_keyframes("walk-clock", ends, seconds))
+    ground = '<rect width="100%" height="100%" fill="var(--paper)"/>'
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}">'
-        f"<title>{escape(title)}</title><style>{_colors() if standalone else ''}{_text_style(zoom)}{''.join(rules)}"
-        "@media (prefers-reduced-motion: reduce) { [class^=walk] { animation-play-state: paused } }</style>"
-        f"{_GROUND if standalone else ''}{''.join(drawn)}</svg>"
-    )
-
-
-def _text_style(zoom: float) -> str:
-    return (
+        f"<title>{escape(title)}</title><style>{_colors() if standalone else ''}"
         f"svg text {{ font: {13 * zoom:.1f}px system-ui, sans-serif; fill: var(--ink) }} "
         f"@media (max-width: 30rem) {{ svg text {{ font-size: {24 * zoom:.1f}px }} svg .minor {{ display: none }} }}"
+        f"{''.join(rules)}"
+        "@media (prefers-reduced-motion: reduce) { [class^=walk] { animation-play-state: paused } }</style>"
+        f"{ground if standalone else ''}{''.join(drawn)}</svg>"
     )
 
 
@@ -110,31 +111,14 @@ def _lane(label: str, pipe: float, width: float) -> str:
     return f'<text x="{_MARGIN_MM:g}" y="{pipe - 12:.0f}">{escape(label)}</text>{walls}'
 
 
-def _ruler(y: float, zero: float, far_mm: float, zoom: float) -> str:
-    """Draw a scale in mm along the pipe."""
-    places = np.arange(0, far_mm + 1e-6, _step(far_mm, 12))
-    return _scale(y, zero, far_mm, [(zero + place, f"{place:g}") for place in places], "mm", zoom)
-
-
-def _clock(y: float, width: float, frames_s: np.ndarray, zoom: float) -> str:
-    """Draw a time axis of the walk with a dot that runs along it."""
-    lasts, long = frames_s[-1] - frames_s[0], width - 2 * _MARGIN_MM
-    places = np.arange(0, lasts + 1e-6, _step(lasts, 10))
-    marks = [(_MARGIN_MM + long * place / lasts, f"{place:g}") for place in places]
-    dot = f'<circle class="walk-clock" r="{6 * zoom:.1f}" fill="var(--ink)"/>'
-    return _scale(y, _MARGIN_MM, long, marks, "s", zoom) + dot
-
-
-def _step(reach: float, most: int) -> float:
-    return next(s for s in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000) if reach / s <= most)
-
-
-def _scale(y: float, start: float, long: float, marks: list[tuple[float, str]], unit: str, zoom: float) -> str:
-    """Draw a line with labelled marks; every other label is `minor`, hidden if there is little room."""
+def _scale(y: float, start: float, long: float, reach: float, most: int, unit: str, zoom: float) -> str:
+    """Draw a line from `start` with at most about `most` marks, labelled from 0 to `reach`; every other label is
+    `minor`, hidden if there is little room."""
+    step = next(s for s in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000) if reach / s <= most)
     drawn = [f'<path d="M{start:.0f} {y:.0f}h{long:.0f}" stroke="var(--quiet)"/>']
-    for number, (x, label) in enumerate(marks):
+    for number, place in enumerate(np.arange(0, reach + 1e-6, step)):
+        x, said = start + long / reach * place, f"{place:g}" if number else f"{place:g} {unit}"
         minor = ' class="minor"' if number % 2 else ""
-        said = label if number else f"{label} {unit}"
         anchor = "start" if number == 0 else "end" if x > start + long - 20 * zoom else "middle"
         drawn.append(f'<path d="M{x:.0f} {y:.0f}v{7 * zoom:.0f}" stroke="var(--quiet)"/>')
         drawn.append(f'<text{minor} x="{x:.0f}" y="{y + 30 * zoom:.0f}" text-anchor="{anchor}">{said}</text>')

@@ -1,4 +1,4 @@
-"""Description of a figure, to be drawn as a picture (`picture`) or as a zoomable plot (`plot`)."""
+"""Description of a figure, to be drawn as a picture (`picture`) or as a zoomable plot (`page`)."""
 
 from __future__ import annotations
 

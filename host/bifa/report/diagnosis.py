@@ -60,12 +60,12 @@ def diagnosis_page(
 def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[ChartedSection]:
     """Sections on what was found, and on the errors of both models."""
     effects = record["effects"]
-    found = []
-    if effects:
-        found.append(ChartedSection("What was found", found_sentences(effects), (effects_table(effects),)))
-    found.append(ChartedSection("Where the base model is off", (RESIDUAL, spoken(record["signature"]["text"], labels))))
-    found.append(ChartedSection("Error before and after", charts=[errors_chart(record["error"])]))
-    return found
+    found = [ChartedSection("What was found", found_sentences(effects), (effects_table(effects),))] if effects else []
+    return [
+        *found,
+        ChartedSection("Where the base model is off", (RESIDUAL, spoken(record["signature"]["text"], labels))),
+        ChartedSection("Error before and after", charts=[errors_chart(record["error"])]),
+    ]
 
 
 def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -93,6 +93,8 @@ def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[Cha
     said = [f"Added to the model: {curve['term']}, a curve over {curve['variable']}." for curve in learnt]
     left = [spoken(record["remainder"]["text"], labels)] if record["effects"] else []
     hidden = ", ".join(effect_words(name) for name in record["not_detectable_here"])
+    separated = " from ".join(effect_words(name) for name in coming["separates"])
+    next_one = f"A further experiment would tell {separated}: {settings_words(coming)}." if coming["experiment"] else ""
     sections = (
         ChartedSection("Learnt from the data", said, charts=[learnt_chart(curve) for curve in learnt]),
         ChartedSection("What the named effects leave", left),
@@ -100,7 +102,7 @@ def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[Cha
         ChartedSection("Also tried", tables=nearest_table(record)),
         ChartedSection("Before you believe it", [spoken(line, labels) for line in record["warnings"]]),
         ChartedSection("Not detectable in this data", [f"{hidden}."] if hidden else []),
-        ChartedSection("Next experiment", [next_sentence(coming)] if coming["experiment"] else []),
+        ChartedSection("Next experiment", [next_one] if next_one else []),
     )
     return [section for section in sections if section.paragraphs or section.tables]
 
@@ -108,13 +110,15 @@ def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[Cha
 def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any] | None = None) -> PageTable:
     """Tabulate the parameters of every effect with their intervals; `truth` adds the sealed values."""
     rows = []
-    names = dict.fromkeys([*(effect["name"] for effect in effects), *(truth or {})])
     found = {effect["name"]: effect for effect in effects}
-    for name in names:
+    for name in dict.fromkeys([*found, *(truth or {})]):
         mine, true = found.get(name), (truth or {}).get(name, {})
         for key in dict.fromkeys([*(mine["parameters"] if mine else ()), *true]):
             meaning, unit = effect_parameter(name, key)
-            value, ends = ("not found", "") if mine is None else _value_and_interval(mine, key, unit)
+            value, ends = "not found", ""
+            if mine is not None:
+                value, (low, high) = quantity(mine["parameters"][key], unit, 3), mine["interval_90"][key]
+                ends = "" if None in (low, high) else f"{quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
             row = [f"{effect_words(name)}: {meaning}", value, ends]
             rows.append(row + ([quantity(true[key], unit, 3) if key in true else "absent"] if truth else []))
     columns = ["", "found", "90 % interval", *(["sealed value"] if truth is not None else [])]
@@ -129,12 +133,6 @@ def base_table(record: Mapping[str, Any]) -> list[PageTable]:
             ends = "" if None in one["interval_90"] else " to ".join(plain(end, 4) for end in one["interval_90"])
             rows.append((parameter_words(name), plain(one["value"], 4), ends, BASE_PARAMETERS[name].unit))
     return [PageTable(("", "value", "90 % interval", "unit"), rows)] if rows else []
-
-
-def _value_and_interval(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
-    value, (low, high) = effect["parameters"][key], effect["interval_90"][key]
-    ends = "" if low is None or high is None else f"{quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
-    return quantity(value, unit, 3), ends
 
 
 def nearest_table(record: Mapping[str, Any]) -> list[PageTable]:
@@ -154,11 +152,8 @@ def noise_table(error: Mapping[str, Any]) -> PageTable:
     """Tabulate errors before and after, of fitted and held-out trials and by experiment, with the noise floor."""
     labels = {"fitted": "fitted", "held_out": "held-out", "held_out_conditions": "held-out, new conditions"}
     sides = ("before", "after", "noise_floor")
-    rows = [
-        [label, *(_noise(error[side].get(what)) for side in sides)]
-        for what, label in labels.items()
-        if error["before"].get(what) is not None
-    ]
+    here = {what: label for what, label in labels.items() if error["before"].get(what) is not None}
+    rows = [[label, *(_noise(error[side].get(what)) for side in sides)] for what, label in here.items()]
     for name in error["before"]["by_experiment"]:
         rows.append([experiment_words(name), *(_noise(error[s]["by_experiment"].get(name)) for s in sides[:2]), "1.00"])
     columns = ["RMS error, in units of the noise floor", "base model", "completed model", "noise floor"]
@@ -167,12 +162,6 @@ def noise_table(error: Mapping[str, Any]) -> PageTable:
 
 def _noise(value: float | None) -> str:
     return "" if value is None else f"{value:.2f}"
-
-
-def next_sentence(coming: Mapping[str, Any]) -> str:
-    """Describe the experiment that would tell apart what this data cannot."""
-    separated = " from ".join(effect_words(name) for name in coming["separates"])
-    return f"A further experiment would tell {separated}: {settings_words(coming)}."
 
 
 def settings_words(experiment: Mapping[str, Any]) -> str:

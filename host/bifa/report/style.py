@@ -5,7 +5,6 @@ from typing import Any
 from lacuna.report.page import COLORS
 from lacuna.report.style import LOOK
 
-CHAMBERS = ("body", "head", "tail")
 # Okabe and Ito's palette: distinct for readers with any colour vision, and on paper. Nothing else uses these colours.
 CHAMBER_COLORS = {"body": "#0072B2", "head": "#D55E00", "tail": "#009E73"}
 # By role; all but `grid` have a contrast of at least 3 to 1 against `paper`.

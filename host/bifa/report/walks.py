@@ -11,7 +11,7 @@ import numpy as np
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, edges, thinned
 from bifa.report.evidence import BASE, COMPLETED
 from bifa.report.picture import draw_chart
-from bifa.report.style import CHAMBERS
+from bifa.robot.cpg import CHAMBERS
 
 MEASURED, SIMULATED = "measured", "simulated"
 _ROLES = {BASE: "before", COMPLETED: "after"}  # everything else is drawn in ink
@@ -73,22 +73,13 @@ def _column(
         for row, chamber in enumerate(CHAMBERS)
         for x, y in [edges(*_truncate(walk.first, f"command_{chamber}", horizon_s))]
     ]
-    pressures = [
-        Series(
-            (chamber, name), *thinned(*_truncate(record, f"pressure_{chamber}_psi", horizon_s)), chamber, lines[name]
-        )
-        for name, record in walk.records.items()
-        for chamber in CHAMBERS
-    ]
-    paths = [
-        Series(
-            (name,),
-            *thinned(*_truncate(record, "displacement_head_mm", horizon_s)),
-            _ROLES.get(name, "ink"),
-            lines[name],
-        )
-        for name, record in walk.records.items()
-    ]
+    pressures, paths = [], []
+    for name, record in walk.records.items():
+        x, y = thinned(*_truncate(record, "displacement_head_mm", horizon_s))
+        paths.append(Series((name,), x, y, _ROLES.get(name, "ink"), lines[name]))
+        for chamber in CHAMBERS:
+            x, y = thinned(*_truncate(record, f"pressure_{chamber}_psi", horizon_s))
+            pressures.append(Series((chamber, name), x, y, chamber, lines[name]))
     rows = {chamber: row * _ROW + 0.5 * _BAR for row, chamber in enumerate(CHAMBERS)}
     panels = [
         Panel(outputs, time, Axis("output", (-0.2, 3 * _ROW), ticks=rows), height=0.7),

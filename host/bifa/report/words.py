@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from math import floor, log10
 
 from bifa.effects import library
+from bifa.robot.cpg import CHAMBERS
 from bifa.robot.parameters import BASE_PARAMETERS
 
 # Phrases for the values of effects; without a phrase, an effect's values are listed with their meanings.
@@ -33,7 +34,6 @@ _PHRASES = {
 }
 NBSP = "\N{NO-BREAK SPACE}"  # between a number and its unit
 _UNIT = re.compile("_(N_psi|Ns_m|N_m|s_per_psi|per_s|mm_s|m_s|mm|psi|N|m|kg|deg|Hz|s|rad)$")
-_PARTS = ("body", "head", "tail")
 _IDENTIFIER = re.compile(r"\b[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+\b")
 _FILE = re.compile(r"[\w.\-]+\.csv\b")
 
@@ -63,7 +63,7 @@ def experiment_words(name: str) -> str:
 def channel_words(name: str) -> str:
     """Return a channel's name in words: "pressure_body_psi" is "pressure of the body"."""
     words = _UNIT.sub("", name).split("_")
-    if words[-1] in _PARTS and len(words) > 1:
+    if words[-1] in CHAMBERS and len(words) > 1:
         return f"{' '.join(words[:-1])} of the {words[-1]}"
     return " ".join(words)
 
@@ -77,7 +77,7 @@ def gait_words(gait: Mapping[str, float]) -> str:
     """Return a gait in words, such as "2.72 s, head 204° and tail 332° ahead, vacuum in 0.65 (body), 0.44 (head) and
     0.44 (tail) of the cycle"."""
     head, tail = (f"{gait[f'psi1{i}_deg']:.0f}°" for i in (2, 3))
-    body, front, rear = (f"{gait[f'duty_{part}']:.2f}" for part in _PARTS)
+    body, front, rear = (f"{gait[f'duty_{part}']:.2f}" for part in CHAMBERS)
     vacuum = f"vacuum in {body} (body), {front} (head) and {rear} (tail) of the cycle"
     return f"{plain(gait['period_s'])}{NBSP}s, head {head} and tail {tail} ahead, {vacuum}"
 

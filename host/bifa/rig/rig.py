@@ -1,12 +1,13 @@
 """What `--port` refers to: an Uno on a serial port, or a whole rig that a package offers by name."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
 from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
 
 from bifa.errors import BifaError
+from bifa.link import NoAnswerError, PortGoneError, RestartedError, StillMovingError
 from bifa.link.transport import Clock, Transport, WallClock
 from bifa.rig.ports import serial_ports, uno_ports
 from bifa.rig.serial_transport import SerialTransport
@@ -17,6 +18,11 @@ GET_VIRTUAL = "in a clone, on Linux: `make setup`, or `pip install -e host/virtu
 
 class RigError(BifaError):
     """There is no rig at the requested port."""
+
+
+# Errors after which the board may come back. RigError: no Uno is plugged in.
+GONE = (PortGoneError, NoAnswerError, RestartedError, StillMovingError, RigError)
+RETRY_S = 1.0  # time between attempts to find it
 
 
 @runtime_checkable
@@ -121,3 +127,32 @@ def open_rig(port: str | None = None, **options: Any) -> Rig:
     if options:
         raise RigError(f"{', '.join(options)}: only a virtual rig takes these options")
     return SerialRig(port if port is not None else find_port())
+
+
+class SameBoard:
+    """`open()` opens the rig at `port`; later calls open only that of the same board, identified by the serial number
+    of its USB chip, at whichever port it is then. `serial_number` is None if the board has none, as many copies do."""
+
+    def __init__(self, port: str | None, open_port: Callable[..., Any] = open_rig) -> None:
+        self._port, self._open_port = port, open_port
+        self._was_there = False
+        self.serial_number: str | None = None
+
+    def open(self) -> Any:
+        """Open the Rig. Raises RigError or PortGoneError if that board is not plugged in; no other board is opened."""
+        if self._was_there:
+            return self._open_port(_port_of(self.serial_number) if self.serial_number else self._port)
+        port = self._port  # None: that of the only Uno
+        boards = [one for one in serial_ports() if (one.device == port if port is not None else one.board)]
+        self.serial_number = boards[0].serial_number if len(boards) == 1 else None
+        rig = self._open_port(port)
+        self._was_there = True
+        return rig
+
+
+def _port_of(serial_number: str) -> str:
+    for port in serial_ports():
+        if port.serial_number == serial_number:
+            return port.device
+    others = ", ".join(f"{port.device} ({port.description})" for port in serial_ports()) or "none"
+    raise RigError(f"the Uno with serial number {serial_number} is not plugged in (USB serial ports: {others})")

@@ -3,7 +3,7 @@
 from bifa.robot.gait import BASELINE, Gait, GaitError, GaitFile, load_gait, read_gait_file, save_gait
 from bifa.robot.model import Covariance, Model
 from bifa.robot.model_file import ModelFileError, load_model, nominal, save_model, strong_push
-from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter, ModelParameterError
+from bifa.robot.parameters import BASE_PARAMETERS, ModelParameterError
 from bifa.robot.stiffness import StiffnessCurve
 
 __all__ = [
@@ -15,7 +15,6 @@ __all__ = [
     "GaitFile",
     "Model",
     "ModelFileError",
-    "ModelParameter",
     "ModelParameterError",
     "StiffnessCurve",
     "load_gait",

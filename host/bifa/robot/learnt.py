@@ -54,11 +54,3 @@ class LearntCurve:
         return np.interp(
             np.asarray(where, dtype=float), np.linspace(self.lower, self.upper, self.values.shape[1]), self.values[row]
         )
-
-
-def check(name: str, curve: LearntCurve) -> None:
-    """Raise ModelParameterError if there is no term `name` or the curve has the wrong number of rows."""
-    if name not in ROWS:
-        raise ModelParameterError(f"no curve can be learnt at {name!r}; possible terms are {', '.join(ROWS)}")
-    if len(curve.values) != ROWS[name]:
-        raise ModelParameterError(f"the learnt curve {name} has {len(curve.values)} rows instead of {ROWS[name]}")

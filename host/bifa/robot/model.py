@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bifa import effects as library
-from bifa.robot.learnt import LearntCurve
-from bifa.robot.learnt import check as check_learnt
+from bifa.robot.learnt import ROWS, LearntCurve
 from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter, ModelParameterError
 from bifa.robot.stiffness import StiffnessCurve
 
@@ -104,7 +103,10 @@ class Model:
             parameter.check(parameter.value)
         object.__setattr__(self, "effects", {name: library.complete(name, v) for name, v in self.effects.items()})
         for name, curve in self.learnt.items():
-            check_learnt(name, curve)
+            if name not in ROWS:
+                raise ModelParameterError(f"no curve can be learnt at {name!r}; possible terms are {', '.join(ROWS)}")
+            if (rows := len(curve.values)) != ROWS[name]:
+                raise ModelParameterError(f"the learnt curve {name} has {rows} rows instead of {ROWS[name]}")
         if self.covariance is not None:
             for name in self.covariance.names:
                 self[name]

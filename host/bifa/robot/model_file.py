@@ -105,13 +105,15 @@ def _build(document: dict[str, Any]) -> Model:
     entries = document["parameters"]
     _only(entries, "parameters", set(BASE_PARAMETERS))
     effects, learnt = _tables(document, "effects"), _tables(document, "learnt")
+    for name, entry in learnt.items():
+        _only(entry, f"learnt.{name}", {"lower", "upper", "values"})
     return Model(
         name=str(document["name"]),
         parameters={name: _parameter(name, entries[name]) for name in BASE_PARAMETERS},
         body_stiffness=_read_curve("body", document["stiffness"]["body"]),
         small_stiffness=_read_curve("small", document["stiffness"]["small"]),
         effects=effects,
-        learnt={name: _learnt(name, entry) for name, entry in learnt.items()},
+        learnt={name: LearntCurve(**entry) for name, entry in learnt.items()},
         covariance=_read_covariance(document["covariance"]) if "covariance" in document else None,
         provenance=str(document.get("provenance", "")),
         scatter=_read_scatter(document["scatter"]) if "scatter" in document else None,
@@ -166,11 +168,6 @@ def _read_curve(name: str, entry: dict[str, Any]) -> StiffnessCurve:
     curve = StiffnessCurve(coefficients, float(entry["lower_m"]), float(entry["upper_m"]))
     curve.equilibria_m  # noqa: B018 - raises if the curve is not bistable
     return curve
-
-
-def _learnt(name: str, entry: dict[str, Any]) -> LearntCurve:
-    _only(entry, f"learnt.{name}", {"lower", "upper", "values"})
-    return LearntCurve(**entry)
 
 
 def _only(table: dict[str, Any], where: str, required: set[str], optional: Set[str] = frozenset()) -> None:

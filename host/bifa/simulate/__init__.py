@@ -20,12 +20,11 @@ from bifa.simulate.records import (
     walks,
 )
 from bifa.simulate.rigs import SimulationError
-from bifa.simulate.terrain import Obstacle, Supports, arcs, obstacles, passed_at_m, subtunnels, terrain, tunnel
+from bifa.simulate.terrain import Obstacle, Supports, obstacles, subtunnels, terrain, tunnel
 from bifa.simulate.timeline import (
     Timeline,
     TimelineError,
     of_gait,
-    of_phases,
     of_samples,
     recorded_commands,
     refine,
@@ -44,14 +43,11 @@ __all__ = [
     "TimelineError",
     "anchor_pull",
     "anchor_pulls",
-    "arcs",
     "cores",
     "gait_rows",
     "obstacles",
     "of_gait",
-    "of_phases",
     "of_samples",
-    "passed_at_m",
     "plant",
     "recorded_commands",
     "refine",

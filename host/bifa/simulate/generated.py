@@ -35,7 +35,8 @@ def digest(*texts: str) -> str:
 def folder() -> Path:
     """Folder of generated code: BIFA_CACHE_DIR, else in the user's cache, else a private temporary folder."""
     with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: no home directory
-        chosen = Path(os.environ.get("BIFA_CACHE_DIR") or _users_cache() / "bifa")
+        users = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        chosen = Path(os.environ.get("BIFA_CACHE_DIR") or Path(users) / "bifa")
         chosen.mkdir(parents=True, exist_ok=True)
         if os.access(chosen, os.W_OK):
             return chosen
@@ -43,10 +44,6 @@ def folder() -> Path:
         return temporary_folder()
     except OSError as error:
         raise BifaError("no writable folder for compiled code: set BIFA_CACHE_DIR to one") from error
-
-
-def _users_cache() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 
 
 @functools.cache

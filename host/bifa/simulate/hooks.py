@@ -91,7 +91,7 @@ def _chain(hook: str, names: list[str]) -> list[str]:
         effect = effects.library()[name]
         if "{state}" in each and not effect.states:
             raise EffectError(f"{name}.{hook} returns a state: {name} must declare states=1")
-        state = f"[{layout.state_slot(name)} + actuator]" if effect.states else ""
+        state = f"[{layout.effect_slots()[name]} + actuator]" if effect.states else ""
         body.append(f"if active & {1 << layout.effect_bit(name)}:")
         body.append("    " + each.format(call=_call(hook, effect, state), value=value, state=state))
     if result:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 
 from bifa import effects
@@ -77,18 +78,11 @@ def effect_bit(name: str) -> int:
 
 @cache
 def effect_slots() -> dict[str, int]:
-    slots, used = {}, 0
-    for effect in effects.library().values():
-        slots[effect.name] = used * ACTUATORS
-        used += effect.states
-    return slots | {"": used * ACTUATORS}
-
-
-def state_slot(effect: str) -> int:
-    """Index of the first of an effect's three states (body, head, tail) in `z`."""
-    return effect_slots()[effect]
+    """Index of the first of each effect's three states (body, head, tail) in `z`."""
+    before = itertools.accumulate((effect.states for effect in effects.library().values()), initial=0)
+    return {name: ACTUATORS * states for name, states in zip(effects.library(), before, strict=False)}
 
 
 def state_size() -> int:
     """Length of `z`."""
-    return effect_slots()[""]
+    return ACTUATORS * sum(effect.states for effect in effects.library().values())

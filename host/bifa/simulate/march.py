@@ -14,7 +14,7 @@ import numpy as np
 
 from bifa.simulate import layout
 from bifa.simulate.actuator import read_pressure
-from bifa.simulate.compiled import inner, kernel, merged
+from bifa.simulate.compiled import anyone, inner, kernel, least, merged, worst
 from bifa.simulate.hooks import chains
 from bifa.simulate.stepper import (
     P_BODY,
@@ -29,7 +29,6 @@ from bifa.simulate.stepper import (
     sources,
     step,
 )
-from bifa.simulate.together import anyone, least, worst
 
 LONGEST_S = 0.1
 SHORTEST_S = 1e-5

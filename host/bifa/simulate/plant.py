@@ -64,16 +64,11 @@ def of_values(
     q[layout.SMALL + layout.VOLUME] = (q[layout.SMALL + layout.AREA] * small.stroke_m) / (
         q[layout.BODY + layout.AREA] * body.stroke_m
     )
-    return Plant(q, _mask(active), body.rows, small.rows)
-
-
-def _mask(active: Mapping[str, Mapping[str, float]]) -> int:
-    """Bits of the effects that have a nonzero size."""
     bits = 0
-    for name, values in active.items():
-        if any(values[size.name] != 0.0 for size in effects.library()[name].sizes):
+    for name, sizes in active.items():
+        if any(sizes[size.name] != 0.0 for size in effects.library()[name].sizes):
             bits |= 1 << layout.effect_bit(name)
-    return bits
+    return Plant(q, bits, body.rows, small.rows)
 
 
 def with_curve(plant: Plant, name: str, curve: LearntCurve) -> Plant:

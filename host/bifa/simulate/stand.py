@@ -8,7 +8,7 @@ import numpy as np
 
 from bifa.simulate import layout
 from bifa.simulate.actuator import area_at, pressure_after, pressure_moved, remember, resistance
-from bifa.simulate.compiled import kernel, merged
+from bifa.simulate.compiled import anywhere, kernel, merged
 from bifa.simulate.hooks import chains
 from bifa.simulate.march import march, march_through, new_run, pressures, shown, start_effects
 from bifa.simulate.stepper import (
@@ -24,7 +24,6 @@ from bifa.simulate.stepper import (
     sources,
 )
 from bifa.simulate.timeline import delayed
-from bifa.simulate.together import anywhere
 
 SETTLE_S = 30.0  # under vacuum before a step response: many times every time constant
 HOLD_S = 20.0  # at the test pressure before a static loading or a pull; before a pull, as long again to extend the head

@@ -1,4 +1,4 @@
-"""Valve commands over time: from a gait, from initial phases, or from a record's command columns.
+"""Valve commands over time: from a gait, or from a record's command columns.
 
 A timeline is a table of switches in order of time. A chamber is off (vented) before its first switch.
 """
@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from bifa.errors import BifaError
 from bifa.robot import cpg
@@ -21,7 +20,6 @@ from bifa.simulate.hooks import chains
 from bifa.simulate.stepper import OFF, POSITIVE, VACUUM
 
 _TWO_PI = 2.0 * math.pi
-_RESOLUTION_S = 1e-3
 
 
 class TimelineError(BifaError):
@@ -85,15 +83,6 @@ def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0) -> Time
     """Switches of a settled gait: the phases differ by constant psi from time 0, where the body is at
     `first_phase_rad`."""
     return gait_switches(gait_rows([gait]), np.array([duration_s], dtype=float), float(first_phase_rad))[0]
-
-
-def of_phases(
-    gait: Gait, duration_s: float, initial_rad: ArrayLike, coupling_per_s: float = cpg.COUPLING_PER_S
-) -> Timeline:
-    """Switches from eq. (9), integrated from three initial phases at the robot's 1 kHz."""
-    time = np.arange(0.0, duration_s + 0.5 * _RESOLUTION_S, _RESOLUTION_S)
-    phases = cpg.phases(gait, time, initial_rad, coupling_per_s)
-    return of_samples(time, cpg.outputs(phases, gait).T)
 
 
 def of_samples(time_s: np.ndarray, columns: np.ndarray) -> Timeline:
@@ -193,5 +182,4 @@ def delayed(plant: Any, times: Any, chamber: Any, command: Any) -> Any:
     return late, np.argsort(late, kind="mergesort")
 
 
-COMMANDS = {"positive": POSITIVE, "vacuum": VACUUM, "off": OFF}
-NO_COMMANDS = Timeline(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64))
+NO_COMMANDS = timeline([])

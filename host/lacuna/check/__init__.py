@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from lacuna.check.clocks import coarse_clocks, other_clocks
-from lacuna.check.measured import check_columns, check_constant, check_record, gaps_in_inputs
+from lacuna.check.given import check_names, check_records, coarse_clocks, gaps_in_inputs, other_clocks
 from lacuna.check.model import check_model
-from lacuna.check.names import check_names
 from lacuna.check.repeats import check_inputs, check_times, not_declared, odd_ones, unexplained_differences
 from lacuna.system import System
 
 
 def check(system: System) -> tuple[str, ...]:
-    """Raise MisuseError if the system cannot be diagnosed; return warnings about what needs care, one text each. Costs
-    a few simulations of every trial."""
+    """Raise MisuseError if the system cannot be diagnosed; return warnings. Simulates every trial a few times."""
     trials = tuple(system.trials)
     check_names(system, trials)
-    for trial in trials:
-        check_record(trial)
-    check_columns(trials)
-    check_constant(trials)
+    check_records(trials)
     check_times(trials)
     predictions, said = check_model(system, trials)
     ignored = check_inputs(system, trials, predictions)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lacuna.check.measured import gaps_in_inputs
+from lacuna.check.given import gaps_in_inputs
 from lacuna.check.numbers import SAME, changed, differ, spread
 from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.records import Stretch
@@ -36,7 +36,11 @@ def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Cha
             f" every trial, with the parameters at their initial values. {why}"
         )
     good = [t for t in trials if t.name not in failed]
-    _check_deterministic(system, start, good[0], predictions)
+    if name := changed(predicted(system, start, (), good[0]), predictions[good[0].name], good[0], SAME):
+        raise MisuseError(
+            f"trial {good[0].name}, channel {name}: two predictions with the same parameters differ."
+            " The model must not draw random numbers or keep state between calls."
+        )
     _check_free_run(system, start, good[0], predictions)
     for trial in good:
         system.regressors(trial, predictions[trial.name])
@@ -87,17 +91,8 @@ def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Rec
     return {name: np.array(found[name], float) for name in trial.channels}
 
 
-def _check_deterministic(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
-    if name := changed(predicted(system, start, (), trial), predictions[trial.name], trial, SAME):
-        raise MisuseError(
-            f"trial {trial.name}, channel {name}: two predictions with the same parameters differ."
-            " The model must not draw random numbers or keep state between calls."
-        )
-
-
 def _check_free_run(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
-    """Raise MisuseError if late measured samples of a channel, which cannot serve for an initial state, change its
-    prediction."""
+    """Raise MisuseError if late samples of a channel, which give no initial state, change its prediction."""
     theta = dict(start) | {p.name: p.value for p in system.nuisances(trial)}
     for name, measured in trial.channels.items():
         (found,) = system.predict_trials([theta], (), [_measured_otherwise(trial, name)])
@@ -138,8 +133,7 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
 
 
 def _never_off(system: System) -> list[str]:
-    """Warnings of effects whose bounds keep them away from their absent size, for example a factor that was not
-    declared absent at 1."""
+    """Warnings of effects that their bounds keep away from their absent size, such as a factor not absent at 1."""
     found = []
     for effect in system.effects.values():
         for p in effect.parameters[: effect.sizes]:
@@ -182,8 +176,7 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
 
 
 def predict_unchecked(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
-    """An unchecked prediction, as the search makes it, for parameters that may be far from the initial ones; a failed
-    one (NaN) counts as a change."""
+    """A prediction as the search makes it, at values that may be extreme; a failed one (NaN) counts as a change."""
     theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
     return system.predict_trials([theta], effects, [trial])[0]
 

@@ -55,8 +55,7 @@ def check_inputs(system: System, trials: Sequence[Record], predictions: Mapping[
 
 
 def _differences(trials: Sequence[Record]) -> Iterator[tuple[Record, Record, str, Any, str]]:
-    """Pairs of repeats with the name of an input that differs, the second's values on the first's time base, and a
-    description."""
+    """Pairs of repeats with an input that differs, the second's values at the first's times, and a description."""
     spreads = {name: _input_spread(trials, name) for name in {name for trial in trials for name in trial.inputs}}
     for first, *others in groups_of_repeats(trials):
         for other, name in product(others, sorted(first.inputs)):
@@ -194,8 +193,7 @@ def _at_times_of(first: Record, other: Record, name: str) -> np.ndarray:
 
 
 def _input_spread(trials: Sequence[Record], name: str) -> np.ndarray:
-    """Spread of an input over all trials, since a measured input may be pure noise in one of them; of each of its
-    columns if it has several."""
+    """Spread of (each column of) an input over all trials, since in one it may be pure noise."""
     having = [t for t in trials if _is_sampled(t, name)]
     columns = [np.asarray(t.inputs[name], float) for t in having if _width(t, name) == _width(having[0], name)]
     return np.nanstd(np.concatenate(columns), axis=0) if columns else np.zeros(())

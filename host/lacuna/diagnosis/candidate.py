@@ -11,7 +11,7 @@ import numpy as np
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import at_full_size, rms, with_residuals
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, evaluate_on, fit, starting_point
+from lacuna.estimation.fit import Fit, evaluate_on, fit
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
@@ -22,16 +22,19 @@ _CONTINUED = 1e-3  # tolerance of a refit with fewer effects, relative to the co
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """`fitted` on the trials to fit; `checked`: evaluated on the further trials that judge it (`Split.judging`)."""
+    """`fitted` on the trials to fit; `checked`: evaluated on the further trials that judge it (`Split.judging`).
+    `left_out`: when cross-validated, its refits without one fold of records, each evaluated on that fold, and
+    `checked`, if any condition was never fitted."""
 
     fitted: Fit
     checked: Fit
     policy: Policy
+    left_out: tuple[Fit, ...] = ()
 
     @property
     def judged(self) -> tuple[Fit, ...]:
         """Evaluations on the trials that the explanation was not fitted to."""
-        return (self.checked,)
+        return self.left_out or (self.checked,)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -55,7 +58,7 @@ class Candidate:
     @property
     def checked_cost(self) -> float:
         """Negative log-likelihood of the trials that it was not fitted to."""
-        return self.checked.cost
+        return sum(fit.cost for fit in self.judged)
 
     @property
     def trials(self) -> tuple[Record, ...]:
@@ -118,18 +121,13 @@ def costs_by_trial(fits: Sequence[Fit]) -> dict[str, float]:
 
 
 def implausibility(fitted: Fit, policy: Policy) -> float:
-    """The penalty for parameters outside their plausible ranges."""
-    total = 0.0
+    """The penalty for parameters outside their plausible ranges, by their distance from these in half ranges."""
+    total, theta = 0.0, fitted.theta
     for parameter in fitted.structure.parameters:
         if parameter.plausible is not None:
-            total += policy.implausible * _outside(parameter.plausible, fitted.theta[parameter.name]) ** 2
+            (lower, upper), value = parameter.plausible, theta[parameter.name]
+            total += policy.implausible * (max(lower - value, value - upper, 0.0) / (0.5 * (upper - lower))) ** 2
     return total
-
-
-def _outside(plausible: tuple[float, float], value: float) -> float:
-    """Distance of `value` from the plausible range, in half ranges."""
-    lower, upper = plausible
-    return max(lower - value, value - upper, 0.0) / (0.5 * (upper - lower))
 
 
 def judge(fitted: Fit, split: Split, policy: Policy, near: Fit | None = None) -> Candidate:
@@ -141,14 +139,13 @@ def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split)
     parent = candidate.fitted
     kept = tuple(e for e in candidate.effects if e in effects)
     structure = Structure(parent.structure.system, kept, parent.structure.sites)
-    start = [starting_point(parent, structure)]
-    fitted = fit(structure, split.fit, parent.problem.floor, starts=start, relative=_CONTINUED)
+    start = structure.start(parent.theta)
+    fitted = fit(structure, split.fit, parent.problem.floor, starts=[start], relative=_CONTINUED)
     return judge(fitted, split, candidate.policy, near=candidate.checked)
 
 
 def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:
-    """The floor lowered to what repeats' residuals differ by under `candidate`, since a better explanation also removes
-    part of the differences between runs."""
+    """The floor lowered to what repeats' residuals differ by, since a better explanation also explains part of that."""
     residuals = candidate.fitted.residuals() | candidate.checked.residuals()
     system = candidate.fitted.structure.system
     return floor.lowered_by(estimate_noise(system, split.known, residuals))

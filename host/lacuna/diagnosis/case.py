@@ -85,8 +85,7 @@ class Case:
         return any(p.factor_of for trial in self.split.known for p in self.system.nuisances(trial))
 
     def fit_base(self, starts: int) -> Fit:
-        """Fit the base model to the trials to fit, with a noise floor from the differences between repeats' residuals
-        in all trials but the final ones."""
+        """Fit the base model, with a floor from repeats' residuals in all trials but the final ones."""
         structure, split = Structure(self.system), self.split
         floor = estimate_noise(self.system, split.fit + split.judging)
         vectors = spread_starts(structure, structure.start(), starts, self.seed)
@@ -99,13 +98,12 @@ class Case:
         """The same explanation fitted to convergence against another floor."""
         problem = fitted.problem.over(self.split.fit, floor)
         solution = solve(problem, fitted.solution.point, relative=_FINE)
-        return Fit(problem, continue_search(problem, solution, relative=_FINE), fitted.starts, fitted.starts_agreeing)
+        return Fit(problem, continue_search(problem, solution, relative=_FINE))
 
     def sharpen(self, candidate: Candidate) -> Candidate:
         """Refit against the floor that the explanation's own residuals show, as long as the floor falls and the
-        explanation suffices. Nuisances such as a run's initial state may scatter by more than the noise. The first
-        floor, estimated with nuisances at their expected values, contains all of that scatter and the next one still
-        some of it, which would hide structure. The scatter of factors stays in the floor."""
+        explanation suffices. Nuisances such as a run's initial state may scatter by more than the noise, and earlier
+        floors contain that scatter, which would hide structure. The scatter of factors stays in the floor."""
         if self.has_factors:
             return candidate
         for _ in range(MAX_REESTIMATES):
@@ -127,9 +125,8 @@ class Case:
 
     @_cached
     def settled(self, candidate: Candidate) -> Fit:
-        """The explanation at its optimum, with fresh derivatives: the basis of the reported parameters and their
-        uncertainties. If the system sets `tells_of_all`, it is fitted to every trial: once judging is over, the trials
-        that judged may inform parameters, too."""
+        """The explanation at its optimum, with fresh derivatives: the basis of reported parameters. If the system sets
+        `tells_of_all`, it is fitted to every trial: those that judged may inform parameters once judging is over."""
         fitted, others = self.on_known(candidate), self.split.not_fitted
         if self.system.tells_of_all and others:
             near = (fitted, evaluate_on(fitted, others))
@@ -143,20 +140,14 @@ class Case:
 
     @_cached
     def converged(self, candidate: Candidate) -> Fit:
-        """The explanation followed to convergence by plain least squares: the basis of the verdict. If a few large
-        residuals mislead plain least squares, so that never-fitted conditions are predicted worse, the fit before it is
-        returned."""
-        fitted = self.on_known(candidate)
+        """The explanation converged by plain least squares: the basis of the verdict. If a few large residuals mislead
+        that, so that never-fitted conditions are predicted worse, the fit before it is returned."""
+        fitted, unseen = self.on_known(candidate), self.split.unseen
         ended = converged(fitted)
-        return fitted if self._is_misled(ended, fitted) else ended
-
-    def _is_misled(self, ended: Fit, before: Fit) -> bool:
-        if not self.split.unseen:
-            return False
-        (lost, error), (lost_before, error_before) = (
-            at_full_size([evaluate_on(fitted, self.split.unseen)]) for fitted in (ended, before)
-        )
-        return lost > lost_before or error > _MAX_ERROR_RATIO * error_before
+        if not unseen:
+            return ended
+        (lost, error), (lost_before, error_before) = (at_full_size([evaluate_on(f, unseen)]) for f in (ended, fitted))
+        return fitted if lost > lost_before or error > _MAX_ERROR_RATIO * error_before else ended
 
     @_cached
     def remainder_of(self, candidate: Candidate) -> Remainder:
@@ -234,9 +225,8 @@ class Case:
         return self.exceeds_on_all(([candidate.fitted], [better.fitted]), (candidate.judged, better.judged))
 
     def exceeds_on_all(self, *both: tuple[Sequence[Fit], Sequence[Fit]]) -> bool:
-        """Whether, in any pair, the first fits leave relevantly more than the second ones; or whether they do so in
-        every pair if each run's factors are set to their means (`predictive`), since a few runs of one pair may differ
-        that way by chance."""
+        """Whether, in any pair, the first fits leave relevantly more than the second; or in every pair with each run's
+        factors at their means (`predictive`), since a few runs of one pair may differ that way by chance."""
         known = (excess_over(*pair, self.system.accuracy) for pair in both)
         unseen = (tuple([predictive(fit) for fit in fits] for fits in pair) for pair in both)
         ahead = (excess_over(mine, others, self.system.accuracy) for mine, others in unseen)
@@ -247,13 +237,8 @@ class Case:
         """Whether an explanation leaves so little that a fit from another start might leave nothing that matters."""
         return self._tested(candidate.fitted, candidate.checked).worst < _MAX_TO_REFIT
 
-    def may_be_lost(self, candidate: Candidate) -> bool:
-        """Whether what an explanation leaves may be due to a local optimum of its fit."""
-        return self.nearly(candidate) and not self.suffices(candidate)
-
     def closed(self, candidate: Candidate, base: Candidate) -> float:
-        """The share of the base model's gap that an explanation closes on the trials that judge it and that it was not
-        fitted to."""
+        """The share of the base model's gap that an explanation closes on the judging trials it was not fitted to."""
         if base in self.cross_validated and candidate in self.cross_validated:
             base, candidate = self.cross_validated[base], self.cross_validated[candidate]
         scaled = by_trial([candidate.fitted, candidate.checked])

@@ -8,7 +8,7 @@ different kind.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from lacuna.diagnosis.candidate import Candidate
@@ -24,30 +24,13 @@ _COMPARED = 10  # largest number of explanations cross-validated, best first
 _REFIT: dict[str, Any] = {"max_iterations": 12, "relative": 1e-5}
 
 
-@dataclass(frozen=True, eq=False)
-class CrossFitted(Candidate):
-    """An explanation `fitted` to all known records. `left_out`: its refits without one fold of records, each evaluated
-    on that fold, and its evaluation on the conditions never fitted, if any."""
-
-    left_out: tuple[Fit, ...]
-
-    @property
-    def judged(self) -> tuple[Fit, ...]:
-        return self.left_out
-
-    @property
-    def checked_cost(self) -> float:
-        return sum(fit.cost for fit in self.left_out)
-
-
 def is_due(case: Case) -> bool:
     """Whether to cross-validate: no condition has repeats, and there are more than two known records."""
     return len(case.split.known) > 2 and all(len(group) == 1 for group in groups_of_repeats(case.system.trials))
 
 
 def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
-    """Cross-validate the leading explanations of `found` and their subsets on every known record. The case maps the
-    original candidates to these (`Case.cross_validated`)."""
+    """Cross-validate the leading explanations and their subsets; `Case.cross_validated` maps originals to results."""
     least = min(c.cost for c in found.tried)
     near = [c for c in found.tried if c is not found.base and c.cost < case.policy.reach * least]
     near.sort(key=lambda c: c.cost)
@@ -65,7 +48,7 @@ def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
         mine = left_out[k * len(folds) : (k + 1) * len(folds)]
         unseen = evaluate_on(fit, case.split.unseen)
         left = tuple([*mine, unseen] if case.split.unseen else mine)
-        judged[candidate] = CrossFitted(fit, unseen, case.policy, left)
+        judged[candidate] = Candidate(fit, unseen, case.policy, left)
     return replace(
         found,
         base=judged[found.base],

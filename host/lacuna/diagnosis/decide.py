@@ -136,9 +136,8 @@ class Comparison:
         )
 
     def _is_much_worse(self, one: Candidate, other: Candidate) -> bool:
-        """Whether each additional effect closes the required share of what is left, and also either the required share
-        of the gap or half of what is left. By mean squares on trials not fitted, without compression of large
-        residuals."""
+        """Whether each additional effect closes its share of what is left, and also its share of the gap or half of
+        what is left: by mean squares on trials not fitted, without compression of large residuals."""
         squares = _mean_squares(one, other, self.search.base)
         if squares is None:  # `other` predicts trials that `one` cannot
             return True
@@ -191,8 +190,7 @@ def _drawn(conditions: int) -> np.ndarray:
 
 
 def _by_condition(candidates: Sequence[Candidate], which: str, *, mean: bool = False) -> np.ndarray:
-    """Costs per condition, sums or means over its trials, shape (candidates, conditions). Per trial if there are few
-    conditions."""
+    """Costs per condition (per trial if these are few), sums or means, shape (candidates, conditions)."""
     costs = [getattr(c, which) for c in candidates]
     trials = [t for t in candidates[0].trials if t.name in costs[0]]
     keys: list[Hashable] = [(t.experiment, t.condition) for t in trials]
@@ -243,12 +241,10 @@ def _compared(search: Search, chosen: Candidate) -> list[Candidate]:
 
 
 def _weights(compared: Sequence[Candidate], dispersion: float) -> dict[tuple[str, ...], float]:
-    """Weight of each explanation among those compared (pseudo-BMA+; Yao and others 2018).
-
-    The likelihood alone would favour one slightly wrong model over another by factors such as e^1000, although which of
-    them explains better differs from condition to condition. So conditions are resampled, and an explanation's weight
-    is its share of the likelihood, tempered by the dispersion and averaged over the draws.
-    """
+    """Weights of each explanation among those compared (pseudo-BMA+; Yao and others 2018). The likelihood alone would
+    favour one slightly wrong model over another by factors such as e^1000, although which of them explains better
+    differs from condition to condition: so conditions are resampled, and an explanation's weight is its share of the
+    likelihood, tempered by the dispersion and averaged over the draws."""
     costs = _by_condition(compared, "by_trial")
     penalty = np.array([c.cost for c in compared]) - costs.sum(axis=1)
     drawn = _drawn(costs.shape[1]) @ costs.T + penalty

@@ -101,10 +101,10 @@ def diagnose(
     executor: Executor | None = None,
 ) -> Diagnosis:
     """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a given seed. `suspected`
-    effects, for example those named by a diagnosis of fewer trials, are fitted whatever their score, unless the base
-    model suffices. Explanations are tried on `executor` if one is given, which must be able to ship the system. Ctrl-C
-    while explanations or curves are tried stops the search and continues with the best result so far. Raises
-    MisuseError before the search if the system or its trials would mislead it."""
+    effects are fitted whatever their score, unless the base model suffices. Explanations are tried on `executor` if one
+    is given, which must be able to ship the system. Ctrl-C while explanations or curves are tried stops the search and
+    continues with the best result so far. Raises MisuseError before the search if the system or its trials would
+    mislead it."""
     began = time.monotonic()
     if unknown := sorted(set(suspected) - set(system.effects)):
         raise MisuseError(f"suspected: there is no effect {unknown[0]!r}; there are {', '.join(system.effects)}.")
@@ -160,8 +160,7 @@ def decide(case: Case, found: Search, hand: Stoppable) -> tuple[Search, Choice, 
 
 
 def _fit_to_report(case: Case, judged: Assessment, shown: Candidate, final: Fit) -> Fit:
-    """The fit that parameters are reported from: the explanation's, or the final model's if that has curves or nothing
-    is explained."""
+    """The fit to report from: the explanation's, or the final one if that has curves or nothing is explained."""
     if judged.verdict != "unexplained" and not final.structure.sites:
         return case.settled(shown)
     others = case.split.not_fitted if case.system.tells_of_all else ()
@@ -324,7 +323,7 @@ def _reported(
 def explanations(case: Case, base: Fit, hand: Stoppable) -> Search:
     """Fit and return all explanations; none but the base model if that suffices."""
     first = case.judge(base)
-    if case.may_be_lost(first):
+    if case.nearly(first) and not case.suffices(first):  # it may be in a local optimum
         hand.on_progress("fitting the base model from other starts, too")
         first = refit_multi_start(first, case.split, case.seed, hand.workers)
     first = case.sharpen(first)
@@ -340,9 +339,8 @@ def explanations(case: Case, base: Fit, hand: Stoppable) -> Search:
 
 
 def _add_learnt_curves(case: Case, found: Search, choice: Choice, judged: Assessment, workers: Workers | None) -> Fit:
-    """The explained model with learnt curves on top, if they also improve the final trials; without workers no curves
-    are learnt. If no mechanism is supported, everything tried competes with the curves, so that the final model is
-    never worse than the best of these."""
+    """The explained model with learnt curves on top (none without workers), if they also improve the final trials. If
+    no mechanism is supported, everything tried competes with the curves: the final model is the best."""
     split, unexplained = case.split, judged.verdict == "unexplained"
     parents = list(dict.fromkeys((found.base, choice.explanation))) if unexplained else [choice.explanation]
     learnt = None

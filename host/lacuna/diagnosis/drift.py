@@ -12,7 +12,7 @@ from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
 
 _SHUFFLES = 2000
-_MIN_TRIALS = 6  # ordered trials, and effective number of trials that inform a parameter
+_MIN_TRIALS = 6  # ordered trials, and how many of equal weight would inform a parameter as well
 
 
 class Drift(NamedTuple):
@@ -27,12 +27,10 @@ class Drift(NamedTuple):
 
 
 def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[Drift, ...]:
-    """Find base parameters whose value, estimated from single trials, changes with `session_order`.
-
-    Projecting each trial's residual on the derivative with respect to a parameter gives the shift of the parameter that
-    this trial alone would favour, weighted by its precision and by the scatter between trials (DerSimonian and Laird
-    1986). The correlation with the order is compared with that of shuffled orders, over all parameters at once.
-    """
+    """Find base parameters whose value, estimated from single trials, changes with `session_order`. Projecting each
+    trial's residual on the derivative with respect to a parameter gives the shift that this trial alone would favour,
+    weighted by its precision and by the scatter between trials (DerSimonian and Laird 1986). Its correlation with the
+    order is compared with that of shuffled orders, over all parameters at once."""
     trials = fitted.problem.trials
     places = {k: t.session_order for k, t in enumerate(trials) if t.session_order is not None}
     ordered = list(places)
@@ -61,8 +59,7 @@ def _moved(trial_shifts: np.ndarray, weights: np.ndarray, order: np.ndarray) -> 
 
 
 def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> float:
-    """What such shifts add to the mean square residual in the experiment where they add most; a channel in which that
-    is within the declared accuracy adds nothing."""
+    """What such shifts add to the mean square residual where they add most, beyond the declared accuracy."""
     squares: dict[str, float] = defaultdict(float)
     pieces: dict[str, float] = defaultdict(float)
     by_channel: dict[tuple[str, str], list[float]] = defaultdict(lambda: [0.0, 0.0])
@@ -75,7 +72,7 @@ def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> f
         for channel, part in zip(trial.channels, np.split(derivative, np.cumsum(known)[:-1]), strict=True):
             of_channel = by_channel[trial.experiment, channel]
             of_channel[0] += float(part @ part) * shift**2
-            of_channel[1] += len(part) / floor.samples_per_piece(trial, channel)
+            of_channel[1] += len(part) / floor.of(trial.experiment, channel).samples_per_piece
     for (experiment, channel), (square, count) in by_channel.items():
         enough = (fitted.structure.system.accuracy(experiment, channel) / floor.of(experiment, channel).sd) ** 2
         if square <= enough * count:
@@ -88,14 +85,15 @@ def _shifts_by_trial(fitted: Fit, ordered: list[int]) -> tuple[list[int], np.nda
     residuals, jacobians = fitted.problem.residuals(fitted.solution.point), fitted.solution.jacobians
     columns, trial_shifts, weights = [], [], []
     for column, index in enumerate(fitted.solution.free):
-        if index >= fitted.structure.base_size:
+        if index >= len(fitted.structure.system.parameters):
             continue
         pairs = [(jacobians[k][0][:, column], residuals[k]) for k in ordered]
         known = np.array([float(d @ d) for d, _ in pairs])
         pulls = np.array([-float(d @ r) for d, r in pairs])
         shifts = np.divide(pulls, known, out=np.zeros_like(pulls), where=known > 0)
         weight = _weights(shifts, known)
-        if _effective(weight) >= _MIN_TRIALS:
+        square = float(weight @ weight)
+        if square > 0.0 and float(weight.sum()) ** 2 / square >= _MIN_TRIALS:
             columns.append(column)
             trial_shifts.append(shifts)
             weights.append(weight)
@@ -110,12 +108,6 @@ def _weights(shifts: np.ndarray, known: np.ndarray) -> np.ndarray:
     excess = float(known @ (shifts - known @ shifts / total) ** 2) - (count - 1)
     between = max(excess, 0.0) / max(total - float(known @ known) / total, 1e-300)
     return known / (1.0 + between * known)
-
-
-def _effective(weight: np.ndarray) -> float:
-    """Effective number of trials: how many of equal weight would be as informative."""
-    square = float(weight @ weight)
-    return float(weight.sum()) ** 2 / square if square > 0 else 0.0
 
 
 def _trend(trial_shifts: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:

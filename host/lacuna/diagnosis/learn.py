@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate, judge
-from lacuna.diagnosis.race import cold, initial_guess
+from lacuna.diagnosis.race import cold, initial_guess, solved
 from lacuna.diagnosis.residual_error import rms
 from lacuna.diagnosis.score import remaining_after
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.fit import Fit, evaluate_on, starting_point
+from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, solve
 from lacuna.estimation.structure import Structure
@@ -77,11 +77,8 @@ def _best_grown(
     before = min(parents, key=lambda c: c.checked.cost)
     policy = before.policy
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
-    names = [(*p.problem.structure.effects, *p.problem.structure.sites) for p in promises]
     lost = before.checked_error > (0, policy.lost)
-    jobs = [(p.problem, p.start, lost) for p in promises]
-    solutions = workers.map("learning a curve for", names, _coarse, jobs)
-    fits = [Fit(p.problem, solution, 1, 1) for p, solution in zip(promises, solutions, strict=True)]
+    fits = solved("learning a curve for", _coarse, [(p.problem, p.start, lost) for p in promises], workers)
     best = min(
         (judge(fit, split, policy, near=before.checked) for fit in fits), key=lambda c: c.checked.cost, default=None
     )
@@ -90,7 +87,7 @@ def _best_grown(
         return None
     # continued from the coarse fit: a curve does not move the other parameters to another basin
     problem, begun = best.fitted.problem, best.fitted.solution.point
-    refined = judge(Fit(problem, solve(problem, begun, **_REFINED), 1, 1), split, policy, near=before.checked)
+    refined = judge(Fit(problem, solve(problem, begun, **_REFINED)), split, policy, near=before.checked)
     best = min(best, refined, key=lambda c: c.checked.cost)
     # small residuals must not be bought with large ones, which the cost compresses
     return best if best.checked_error < before.checked_error else None
@@ -115,7 +112,7 @@ def _promises(candidate: Candidate, sites: Sequence[str], split: Split, workers:
             continue
         structure = Structure(parent.structure.system, candidate.effects, (*parent.structure.sites, site))
         problem = Problem(structure, split.fit, parent.problem.floor)
-        start = problem.start(starting_point(parent, structure), parent.solution.point.nuisances)
+        start = problem.start(structure.start(parent.theta), parent.solution.point.nuisances)
         knots = range(len(parent.structure.names), len(structure.names))
         moves = np.vstack([one.dense()[0] for one in problem.jacobians(start, knots, problem.first_steps())])
         taken_up, push = basis.T @ moves, moves.T @ remaining

@@ -48,12 +48,14 @@ class Nearest:
 
 
 def describe_effects(case: Case, found: Search, choice: Choice, closed: float) -> tuple[Named, ...]:
-    """Every effect of the choice, largest part first; the parts add up to `closed`, the share of the base model's gap
-    that the effects close together."""
+    """Every effect of the choice, largest part first; the parts add up to `closed`, the share of the gap."""
     candidate = choice.candidate
     fitted, within = case.settled(candidate), case.intervals(candidate)
+    lost = lost_without(case, found, choice)
+    total = sum(max(each, 0.0) for each in lost.values())
+    parts = {e: max(each, 0.0) / total if total > 0.0 else 1.0 / len(lost) for e, each in lost.items()}
     named = []
-    for effect, share in _shares(case, found, choice, closed):
+    for effect, share in sorted(((e, closed * part) for e, part in parts.items()), key=lambda one: -one[1]):
         described = fitted.structure.system.effects[effect]
         full = {p.name: described.full_name(p) for p in described.parameters}
         values = {name: fitted.theta[key] for name, key in full.items()}
@@ -81,17 +83,8 @@ def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Nearest, 
     )
 
 
-def _shares(case: Case, found: Search, choice: Choice, closed: float) -> list[tuple[str, float]]:
-    """Each effect with its part of the share `closed`, largest first."""
-    lost = lost_without(case, found, choice)
-    total = sum(max(each, 0.0) for each in lost.values())
-    parts = {e: max(each, 0.0) / total if total > 0.0 else 1.0 / len(lost) for e, each in lost.items()}
-    return sorted(((e, closed * part) for e, part in parts.items()), key=lambda one: -one[1])
-
-
 def lost_without(case: Case, found: Search, choice: Choice) -> dict[str, float]:
-    """For each effect of the choice, the increase of the final trials' mean square without it, in units of the floor's
-    variance; 1 for a single effect."""
+    """By effect, the rise of the final trials' mean square without it, in the floor's variance; 1 if it is alone."""
     candidate, lost = choice.candidate, {}
     if len(candidate.effects) == 1:
         return dict.fromkeys(candidate.effects, 1.0)

@@ -19,9 +19,8 @@ _TELLS_APART = 5.0  # log-likelihood
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """The proposed experiment. `separates`: effects that it distinguishes; empty, with `experiment` None, if there is
-    nothing to separate or no experiment on offer does. `gain`: expected log-likelihood ratio between the two closest
-    explanations."""
+    """The proposed experiment; None if there is nothing to separate or none on offer does. `separates`: the effects
+    that it distinguishes; `gain`: expected log-likelihood ratio between the two closest explanations."""
 
     separates: tuple[str, ...] = ()
     experiment: str | None = None

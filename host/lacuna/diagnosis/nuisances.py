@@ -45,8 +45,7 @@ class NuisanceOfRun(NamedTuple):
 
 
 def runs_of(fits: Sequence[Fit]) -> Iterator[NuisanceOfRun]:
-    """Every nuisance of every trial of these fits, except effects' own per-trial parameters (such as phases), which may
-    take any value."""
+    """Every nuisance of every trial, except effects' own per-trial parameters, which may take any value (phases)."""
     for fit in fits:
         every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
         for trial, values, parameters in every:
@@ -58,11 +57,9 @@ def runs_of(fits: Sequence[Fit]) -> Iterator[NuisanceOfRun]:
 def find_followed(fits: Sequence[Fit], *, policy: Policy, seed: int = 0) -> tuple[Followed, ...]:
     """The nuisances that repeats share beyond chance and by so much that predicting a run without knowing its value
     costs more than `relevance`; the largest share first. `fits`: one explanation evaluated on disjoint sets of trials,
-    the first with derivatives.
-
-    The mean product of two repeats' nuisances, in standard deviations from the mean of all runs, estimates the mean
-    square of what they share. Its distribution under chance comes from permuting runs among conditions.
-    """
+    the first with derivatives. The mean product of two repeats' nuisances, in standard deviations from the mean of all
+    runs, estimates the mean square of what they share; permuting runs among conditions gives its distribution under
+    chance."""
     per_sd = _mean_squares_per_sd(fits[0])
     tested = {name: runs for name, runs in by_condition(fits).items() if name in per_sd and _pairs(runs)}
     draw, found = np.random.default_rng(seed), []

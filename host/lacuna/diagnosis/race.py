@@ -17,8 +17,8 @@ from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.score import Promise
 from lacuna.diagnosis.sizes import one_more
 from lacuna.diagnosis.split import Split
-from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.fit import Fit, best_of, continue_search, spread_starts
+from lacuna.diagnosis.workers import Jobs, Workers
+from lacuna.estimation.fit import Fit, continue_search, spread_starts
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, cost_of, solve
@@ -37,7 +37,7 @@ def joined(one: Fit, other: Fit, gain: float) -> Promise:
         one.structure.system, tuple(dict.fromkeys((*one.structure.effects, *other.structure.effects)))
     )
     problem = Problem(structure, one.problem.trials, one.problem.floor)
-    values = structure.values(structure.theta(structure.start()) | other.theta | one.theta)
+    values = structure.start(other.theta | one.theta)
     return Promise(problem, problem.start(values, one.solution.point.nuisances), gain)
 
 
@@ -45,24 +45,18 @@ def cold_starts(promise: Promise) -> list[np.ndarray]:
     """The initial guess with effects at their promised sizes and, if that differs, at their declared sizes."""
     structure = promise.problem.structure
     known = structure.theta(promise.start.values)
-    declared = known | _declared(structure)
+    declared = dict(known)
+    for effect in (structure.system.effects[name] for name in structure.effects):
+        # a limit does nothing until it is reached and much beyond, so what promises most may be far from the truth
+        if 1.0 in effect.start_factors:
+            declared |= {effect.full_name(p): p.value for p in effect.parameters}
     return [initial_guess(structure, one) for one in ([known] if declared == known else [known, declared])]
-
-
-def _declared(structure: Structure) -> dict[str, float]:
-    """Declared sizes of the effects whose `start_factors` include them. A limit does nothing until it is reached and
-    much beyond, so the size that promises most to first order may be far from the true one."""
-    effects = (structure.system.effects[name] for name in structure.effects)
-    return {
-        effect.full_name(p): p.value for effect in effects if 1.0 in effect.start_factors for p in effect.parameters
-    }
 
 
 def initial_guess(structure: Structure, known: dict[str, float]) -> np.ndarray:
     """The base model's initial guess, with the effects and curves at their `known` values."""
     base = {p.name for p in structure.system.parameters}
-    found = {name: value for name, value in known.items() if name not in base and name in structure.names}
-    return structure.values(structure.theta(structure.start()) | found)
+    return structure.start({name: value for name, value in known.items() if name not in base})
 
 
 def race(
@@ -112,11 +106,16 @@ def _cost(candidate: Candidate) -> float:
 
 
 def coarse_fits(parent: Candidate, promises: Sequence[Promise], split: Split, workers: Workers) -> list[Candidate]:
-    names = [one.problem.structure.effects for one in promises]
     jobs = [(one.problem, cold_starts(one), one.start, parent.fitted.cost) for one in promises]
-    solutions = workers.map("fitting", names, _fit_coarsely, jobs)
-    fits = [Fit(one.problem, solution, 1, 1) for one, solution in zip(promises, solutions, strict=True)]
+    fits = solved("fitting", _fit_coarsely, jobs, workers)
     return [judge(fitted, split, parent.policy, near=parent.checked) for fitted in fits]
+
+
+def solved(doing: str, function: Callable[..., Solution], jobs: Jobs, workers: Workers) -> list[Fit]:
+    """The fits of `jobs`, each a problem and further arguments of `function`."""
+    names = [(*problem.structure.effects, *problem.structure.sites) for problem, *_ in jobs]
+    solutions = workers.map(doing, names, function, jobs)
+    return [Fit(problem, solution) for (problem, *_), solution in zip(jobs, solutions, strict=True)]
 
 
 def _fit_coarsely(problem: Problem, begins: Sequence[np.ndarray], warm: Point, contained: float) -> Solution:
@@ -134,9 +133,8 @@ def cold(problem: Problem, values: np.ndarray) -> Solution:
 def fit_to_convergence(candidates: Sequence[Candidate], split: Split, workers: Workers) -> list[Candidate]:
     """Fit candidates to convergence; each is returned unchanged if that does not lower its cost."""
     jobs = [(c.fitted.problem, c.fitted.solution) for c in candidates]
-    solutions = workers.map("finishing", [c.effects for c in candidates], converged, jobs)
-    each = zip(candidates, solutions, strict=True)
-    ended = [judge(Fit(c.fitted.problem, s, 1, 1), split, c.policy, near=c.checked) for c, s in each]
+    each = zip(candidates, solved("finishing", converged, jobs, workers), strict=True)
+    ended = [judge(fitted, split, c.policy, near=c.checked) for c, fitted in each]
     return [min(before, after, key=_cost) for before, after in zip(candidates, ended, strict=True)]
 
 
@@ -148,19 +146,17 @@ def converged(problem: Problem, coarse: Solution) -> Solution:
 
 
 def refit_multi_start(candidate: Candidate, split: Split, seed: int, workers: Workers) -> Candidate:
-    """The better of a converged explanation and its refits from random plausible base parameters (multi-start), begun
-    with its effects at their fitted values."""
+    """The better of a converged explanation and its refits from random plausible base parameters (multi-start)."""
     fitted, structure = candidate.fitted, candidate.fitted.structure
-    problem, values = fitted.problem, fitted.solution.point.values
+    problem, values, base = fitted.problem, fitted.solution.point.values, len(structure.system.parameters)
     begun = spread_starts(structure, values, 1 + _RANDOM_STARTS, seed)[1:]
     for start in begun:
-        start[structure.base_size :] = values[structure.base_size :]
-    jobs = [(problem, start) for start in begun]
-    found = workers.map("fitting from another start:", [structure.effects] * len(jobs), cold, jobs)
-    best = min(found, key=lambda s: s.cost)
+        start[base:] = values[base:]
+    found = solved("fitting from another start:", cold, [(problem, start) for start in begun], workers)
+    best = min(found, key=lambda one: one.cost)
     if best.cost > NEAR * fitted.cost:
         return candidate
-    ended = judge(best_of(problem, [*found, converged(problem, best)]), split, candidate.policy, near=candidate.checked)
+    ended = judge(Fit(problem, converged(problem, best.solution)), split, candidate.policy, near=candidate.checked)
     return min(candidate, ended, key=_cost)
 
 
@@ -169,13 +165,11 @@ def add_each_effect(parent: Fit, effects: Sequence[str], workers: Workers) -> li
     because the parent leaves little, so that its parameters are near the truth."""
     library = parent.structure.system.effects
     jobs = [(*one_more(parent, effect), bool(library[effect].apart)) for effect in effects]
-    found = workers.map("trying", [problem.structure.effects for problem, *_ in jobs], _add_effect, jobs)
-    return [Fit(job[0], solution, 1, 1) for job, solution in zip(jobs, found, strict=True)]
+    return solved("trying", _add_effect, jobs, workers)
 
 
 def helps_without_refit(parent: Fit, effect: str, gain: float) -> bool:
-    """Whether an effect gains `gain` in log-likelihood at one of its start sizes with nothing refitted but its own
-    per-trial parameters: a quick test."""
+    """Whether an effect gains `gain` at one of its start sizes with only its own per-trial values fitted."""
     problem, vectors, nuisances = one_more(parent, effect)
     begun = (problem.start(values, nuisances) for values in vectors)
     return any(cost_of(problem, start) < parent.cost - gain for start in begun)

@@ -117,8 +117,7 @@ def find_remainder(
 
 
 def _of_repeats(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> tuple[float, float, float, float]:
-    """For repeated conditions: `shared`, its z-score, the probability of exceeding it by chance, and its standard
-    deviation under chance."""
+    """For repeated conditions: `shared`, its z-score, its probability by chance, and its standard deviation then."""
     shared, by_chance = _shared(conditions), _null_distribution(conditions, draw)
     z = (shared - by_chance.mean()) / max(by_chance.std(), 1e-12)
     return shared, float(z), _exceeded(by_chance, shared), float(by_chance.std())
@@ -145,19 +144,14 @@ def _by_condition(trials: Sequence[Record], scaled: Sequence[Channels]) -> dict[
     z = dict(zip((trial.name for trial in trials), scaled, strict=True))
     for members in groups_of_repeats(trials):
         for channel in dict.fromkeys(c for t in members for c in z[t.name]):
-            having = [t for t in members if channel in z[t.name]]
-            at = having[0].time_s
-            rows = [
-                _compressed(at_times(at, t.time_s, _with_failures(z[t.name][channel], t.channels[channel])))
-                for t in having
-            ]
+            having, rows = [t for t in members if channel in z[t.name]], []
+            for trial in having:
+                measured, residual = np.isfinite(trial.channels[channel]), z[trial.name][channel]
+                # what the model could not predict is penalized, and what is large compressed, as in a fit
+                penalized = np.where(measured & ~np.isfinite(residual), FAILED, residual)
+                rows.append(SOFT_LIMIT * np.arcsinh(at_times(having[0].time_s, trial.time_s, penalized) / SOFT_LIMIT))
             found[having[0].experiment, channel].append(np.array(rows))
     return found
-
-
-def _with_failures(z: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """`z` with the same penalty as in a fit at measured samples that the model could not predict."""
-    return np.where(np.isfinite(measured) & ~np.isfinite(z), FAILED, z)
 
 
 def _in_common(rows: np.ndarray) -> float:
@@ -166,10 +160,6 @@ def _in_common(rows: np.ndarray) -> float:
         return 0.0
     known = np.isfinite(rows).sum(axis=0)
     return float((known * (known - 1)).sum()) / (len(rows) * (len(rows) - 1))
-
-
-def _compressed(z: np.ndarray) -> np.ndarray:
-    return SOFT_LIMIT * np.arcsinh(z / SOFT_LIMIT)
 
 
 def _shared(conditions: Sequence[np.ndarray]) -> float:

@@ -17,9 +17,8 @@ from lacuna.system import Channels, Record
 
 @dataclass(frozen=True)
 class Error:
-    """RMS residual in units of the noise: over the fitted trials; over the held-out trials, which informed nothing
-    (`Split.final`); over those of them whose conditions were never fitted; and by experiment over the held-out trials,
-    or over the fitted ones if an experiment has no others."""
+    """RMS residual in units of the noise: over fitted trials, over held-out ones (`Split.final`), over those of them in
+    conditions never fitted, and by experiment over the held-out trials, or the fitted ones if it has no others."""
 
     fitted: float
     held_out: float
@@ -68,15 +67,13 @@ def level_of(pairs: Iterable[Channels]) -> float:
 
 
 def share_of_gap(before: float, after: float, floor: float) -> float:
-    """The share of the gap between the error `before` and the floor that is closed, by mean squares; all arguments are
-    RMS."""
+    """The share of the gap between `before` and the floor that is closed, by mean squares; all arguments are RMS."""
     return (before**2 - after**2) / max(before**2 - floor**2, 1e-12)
 
 
 def excess_over(fits: Sequence[Fit], other: Sequence[Fit], accuracy: Callable[[str, str], float]) -> float:
     """The relative excess of the mean square residual of `fits` over that of `other` on the same trials, averaged over
-    an experiment's channels, for the experiment where it is largest. An excess within `accuracy(experiment, channel)`
-    counts as 0."""
+    channels, in the experiment where it is largest. An excess within `accuracy(experiment, channel)` is 0."""
     mine, others = (_mean_squares(one) for one in (fits, other))
     shares: dict[str, list[float]] = defaultdict(list)
     for (experiment, channel), square in mine.items():
@@ -127,8 +124,7 @@ def by_trial(fits: Iterable[Fit]) -> dict[str, Channels]:
 
 
 def failed(every: Iterable[tuple[Record, Channels]]) -> list[str]:
-    """Names of the trials, as from `with_residuals`, of which a fit cannot predict every measured sample: the
-    simulation failed or was aborted."""
+    """Names of the trials (from `with_residuals`) with measured samples that a fit cannot predict."""
     return [
         trial.name
         for trial, channels in every

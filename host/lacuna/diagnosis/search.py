@@ -13,10 +13,9 @@ from lacuna.diagnosis.race import NEAR, joined, race
 from lacuna.diagnosis.score import Promise, Scores, Screened, score
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.fit import reweigh, starting_point
+from lacuna.estimation.fit import reweigh
 from lacuna.estimation.noise import MAX_REESTIMATES, REFIT_SHARE, NoiseFloor
 from lacuna.estimation.solve import cost_of
-from lacuna.system import Effect
 
 LARGEST_SET = 3
 _RACED = {1: 6, 2: 6, 3: 4}  # number of sets raced, by set size,
@@ -28,9 +27,8 @@ _MIN_GAIN = 3.0  # log-likelihood: an effect that gains less counts as not seen
 
 @dataclass(frozen=True)
 class Search:
-    """Every explanation that was fitted, all against the same `floor`, and the screening of the library. `freed`: the
-    best set of each size with the learnt curve that helps most where its own mechanisms act (or without the mechanism,
-    if the curve alone does its work)."""
+    """Every explanation that was fitted, all against the same `floor`, and the screening of the library. `freed`: of
+    each size the best set with the most helpful learnt curve where its mechanisms act (or that curve alone)."""
 
     base: Candidate
     floor: NoiseFloor
@@ -111,8 +109,7 @@ def search(
 
 
 def interrupted_search(base: Candidate, kept: Sequence[Candidate], split: Split) -> Search:
-    """The result of an interrupted search: for each set of effects the best of the `kept` candidates, all against the
-    latest floor."""
+    """An interrupted search: for each set of effects the best of `kept`, all against the latest floor."""
     floor = (kept[-1] if kept else base).fitted.problem.floor
     tried: dict[frozenset[str], Candidate] = {}
     keep_best(tried, (c if c.fitted.problem.floor is floor else reweighed(c, split, floor) for c in (base, *kept)))
@@ -147,20 +144,14 @@ def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate
 
 
 def _singles(case: Case, scores: Scores) -> list[Promise]:
-    """The effects with the best scores, those that a score may miss, and the suspected ones."""
-    library = case.system.effects
-    singles = (one._replace(suspected=one.effect in case.suspected) for one in scores.singles())
-    return [
-        one
-        for rank, one in enumerate(singles)
-        if rank < _RACED[1] or _may_be_missed(library[one.effect]) or one.suspected
-    ]
-
-
-def _may_be_missed(effect: Effect) -> bool:
-    """Whether a score may miss an effect: it has values of its own in every trial or a frequency, or it does nothing at
-    the parent's parameters (`Effect.apart`)."""
-    return bool(effect.own or effect.apart or effect.frequency)
+    """The effects with the best scores, the suspected ones, and those that a score may miss: they have values of their
+    own in every trial or a frequency, or do nothing at the parent's parameters (`Effect.apart`)."""
+    chosen = []
+    for rank, one in enumerate(scores.singles()):
+        effect, suspected = case.system.effects[one.effect], one.effect in case.suspected
+        if rank < _RACED[1] or suspected or effect.own or effect.apart or effect.frequency:
+            chosen.append(one._replace(suspected=suspected))
+    return chosen
 
 
 def _larger(
@@ -209,7 +200,7 @@ def escape_local_optimum(base: Candidate, singles: Sequence[Candidate], split: S
     problem = base.fitted.problem
     costs: dict[Candidate, float] = {}
     for one in singles:
-        start = problem.start(starting_point(one.fitted, base.fitted.structure), one.fitted.solution.point.nuisances)
+        start = problem.start(base.fitted.structure.start(one.fitted.theta), one.fitted.solution.point.nuisances)
         costs[one] = cost_of(problem, start)
     nearest = min(costs, key=costs.__getitem__, default=None)
     if nearest is None or costs[nearest] > NEAR * base.fitted.cost:

@@ -12,7 +12,6 @@ from lacuna.check.numbers import within
 from lacuna.diagnosis.drift import Drift
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.estimation.fit import Fit
-from lacuna.system import Record
 
 _BINS = 15
 _WORTH_NAMING = 0.08  # share of the residual's mean square that a dependence must predict in other runs
@@ -46,10 +45,8 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *,
     sentence on structure that repeats do not demonstrably share, or empty."""
     visible = {*remainder.found, *(key for key, z in remainder.z.items() if z > _VISIBLE)}
     least = _SHARE_OF_LARGEST * remainder.largest
-    places = sorted(
-        (key for key in visible if remainder.shared[key] > least),
-        key=lambda key: (-remainder.shared[key], key),
-    )
+    listed = (key for key in visible if remainder.shared[key] > least)
+    places = sorted(listed, key=lambda key: (-remainder.shared[key], key))
     experiments = tuple(dict.fromkeys(experiment for experiment, _ in places))
     dependences = find_dependences(fitted, places[:4])
     depends_on = list(dict.fromkeys(q for d in dependences for q in d.quantities))[:_MOST_NAMED]
@@ -76,19 +73,15 @@ def _gather(fitted: Fit) -> dict[tuple[str, str], _Rows]:
     for trial, prediction, scaled in zip(
         fitted.problem.trials, predictions, fitted.problem.scaled(predictions), strict=True
     ):
-        quantities = _finite(system.regressors(trial, prediction), trial)
+        offered = system.regressors(trial, prediction)
+        quantities = {name: np.nan_to_num(q) for name, q in offered.items() if q.shape == trial.time_s.shape}
         for channel, z in scaled.items():
             rows[trial.experiment, channel].append((np.clip(z, -50, 50), quantities))
     return rows
 
 
-def _finite(quantities: Mapping[str, np.ndarray], trial: Record) -> dict[str, np.ndarray]:
-    return {n: np.nan_to_num(q) for n, q in quantities.items() if q.shape == trial.time_s.shape}
-
-
 def _dependence(key: tuple[str, str], rows: _Rows) -> Dependence | None:
-    """The quantity or pair of quantities whose binned mean over every other trial best predicts the remaining trials;
-    None if it predicts too little."""
+    """The quantity or pair whose binned mean over every other trial best predicts the rest; None if too little."""
     names = [n for n in rows[0][1] if all(n in quantities for _, quantities in rows)]
     if len(rows) < 2 or not names:  # without names the system offers nothing that a residual may depend on
         return None
@@ -137,8 +130,7 @@ def _placed(
 
 
 def _cannot_tell(remainder: Remainder, experiments: Sequence[str]) -> str:
-    """A caveat for experiments in which finding nothing does not show that nothing is missing; empty if there are
-    none."""
+    """A caveat where finding nothing does not show that nothing is missing; empty if there is none."""
     if not (most := remainder.cannot_tell):
         return ""
     each = ", ".join(f"{size:.1f} x the floor{within(e, experiments)}" for e, size in list(most.items())[:3])

@@ -52,15 +52,14 @@ def split_trials(
     trials: Sequence[Record], spare: Collection[tuple[str, Hashable]] = (), test: Collection[str] = ()
 ) -> Split:
     """Split by whole trials; deterministic. `test`: names of the trials to be `final`, if the user chooses them; those
-    that would be `final` otherwise then go to `select`. Raises MisuseError if the others do not suffice
-    to fit, to judge, or to estimate the noise.
+    that would be `final` otherwise then go to `select`. Raises MisuseError if the others do not suffice to fit, to
+    judge, or to estimate the noise.
 
     `spare`: (experiment, condition) pairs that are never fitted: the last repeat of each is `final`, the others are
     `unseen`. Of three or more repeats of any other condition a third goes to `final` and a third to `select`, rotating
-    from condition to condition, so that no part gets all the early or all the late runs of a session. Of two repeats
-    one is fitted and the other goes to `final` and `select` in turn. Of trials without repeats one in five is `final`
-    and another one in five goes to `select`. No trial is `final` if nothing else could judge, or if it is the only one
-    with a channel.
+    so that no part gets all the early or all the late runs of a session. Of two repeats one is fitted and the other
+    goes to `final` and `select` in turn, of trials without repeats one in five to each. No trial is `final` if nothing
+    else could judge, or if it is the only one with a channel.
     """
     parts: dict[str, list[Record]] = {"fit": [], "select": [], "unseen": [], "final": []}
     pairs = singles = 0

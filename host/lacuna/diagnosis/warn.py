@@ -50,8 +50,7 @@ def repeats_apart(floor: Floor) -> list[str]:
 
 
 def explains_too_little(choice: Choice, split: Split, tested: float | None, policy: Policy) -> list[str]:
-    """A warning for effects that predict better and are still not named. `tested`: the share of the gap that they close
-    on the final trials."""
+    """A warning for effects that predict better and are not named. `tested`: see `Assessment`."""
     named = " and ".join(choice.candidate.effects)
     if tested is not None and tested < policy.half:
         final = listed([trial.name for trial in split.final])
@@ -111,16 +110,13 @@ def warnings_of(fitted: Fit, split: Split) -> tuple[str, ...]:
     others = [trial for trial in split.not_fitted if trial.name not in known]
     held_out = evaluate_on(fitted, others) if others else None
     fits = [fitted, held_out] if held_out else [fitted]
-    return (*_failed(fits), *_parameters(fitted), *_far_nuisances(fits))
-
-
-def _failed(fits: list[Fit]) -> list[str]:
-    if not (names := failed(with_residuals(fits))):
-        return []
-    return [
-        f"The model could not predict {listed(names)}: counted as badly predicted when explanations are compared, and"
-        " left out of the errors."
-    ]
+    said = []
+    if names := failed(with_residuals(fits)):
+        said.append(
+            f"The model could not predict {listed(names)}: counted as badly predicted when explanations are compared,"
+            " and left out of the errors."
+        )
+    return (*said, *_parameters(fitted), *_far_nuisances(fits))
 
 
 def _parameters(fitted: Fit) -> list[str]:
@@ -139,20 +135,24 @@ def _parameters(fitted: Fit) -> list[str]:
     ]
     # where there are no data a learnt curve follows its prior, so any number of its directions are undetermined
     own = [[name for name in direction if not is_learnt(name)] for direction in known.undetermined]
-    found += [f"The data hardly determine {_combined(names)}." for names in own if names]
+    found += [
+        f"The data hardly determine {'a combination of ' if len(names) > 1 else ''}{listed(names)}."
+        for names in own
+        if names
+    ]
     return list(dict.fromkeys(found))
 
 
 def _far_nuisances(fits: list[Fit]) -> list[str]:
-    """Warnings for nuisances far from their expected value, in single trials or on average, or more scattered than they
-    are declared to be."""
+    """Warnings for nuisances far from their expected value, singly or on average, or more scattered than declared."""
     runs: dict[str, list[NuisanceOfRun]] = {}
     for run in runs_of(fits):
         runs.setdefault(run.nuisance.name, []).append(run)
     found = []
     for name, each in runs.items():
         away, nuisance = np.array([one.away for one in each]), each[0].nuisance
-        spread = max(_spread(away), 1.0)
+        # robust against a few trials that are far from all others
+        spread = max(min(float(np.std(away)), 1.4826 * float(np.median(np.abs(away - np.median(away))))), 1.0)
         if spread > _MAX_SPREAD:
             scale = spread * nuisance.step_scale
             found.append(
@@ -174,11 +174,6 @@ def _far_nuisances(fits: list[Fit]) -> list[str]:
                 " worse."
             )
     return found
-
-
-def _spread(away: np.ndarray) -> float:
-    """Standard deviation of `away`, robust against a few trials that are far from all others."""
-    return min(float(np.std(away)), 1.4826 * float(np.median(np.abs(away - np.median(away)))))
 
 
 def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
@@ -210,10 +205,6 @@ def _bound(fitted: Fit, at: Estimate) -> float:
     if parameter.at_least:
         return at.value
     return min((parameter.lower, parameter.upper), key=lambda bound: abs(at.value - bound))
-
-
-def _combined(names: list[str]) -> str:
-    return listed(names) if len(names) == 1 else f"a combination of {listed(names)}"
 
 
 def _quantity(value: float, unit: str, digits: int = 4) -> str:

@@ -1,5 +1,4 @@
-"""Where the work is done: in forked children, one per core, by an executor's workers, or in this process; and how it
-is interrupted."""
+"""Where work is done (in forked children, by an executor's workers, or in this process), and how it is interrupted."""
 
 from __future__ import annotations
 
@@ -33,8 +32,7 @@ class Workers:
         self._forks = forks and sys.platform == "linux" and not current_process().daemon and _has_semaphores()
 
     def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable[..., Any], jobs: Jobs) -> list[Any]:
-        """`function(*job)` for each of `jobs`, in their order. `names`: the effects of each job, for progress messages;
-        empty for the base model."""
+        """`function(*job)` for each of `jobs`, in order. `names`: each job's effects, for messages; empty for none."""
         found = []
         with self._working(function, jobs) as results:
             for effects in names:
@@ -65,9 +63,8 @@ def _has_semaphores() -> bool:
 
 @contextmanager
 def _children(function: Callable[..., Any], jobs: Jobs) -> Iterator[Iterator[Any]]:
-    """Yield an iterator over the results in the jobs' order. A forked child inherits this process's memory, so that
-    only results are pickled and a system may hold objects that cannot be. On an exception the children are terminated
-    at once."""
+    """Yield an iterator over the results in the jobs' order. Forked children inherit this process's memory, so that
+    only results are pickled; on an exception they are terminated at once."""
     before = set(active_children())
     pool = ProcessPoolExecutor(min(cores(), len(jobs)), get_context("fork"), _begin, (function, jobs))
     try:

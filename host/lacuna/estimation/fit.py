@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,7 +18,7 @@ from lacuna.system import Channels, Record, System
 
 _MAX_REWEIGH_ITERATIONS = 40  # iterations with another floor
 
-_SAME_COST = 0.02  # relative: starts whose costs agree to within this found the same minimum
+
 _UNDETERMINED_SD = 0.1  # scales: tolerance of a bound for a parameter that the data do not determine
 _MIN_REL_GAIN = 1e-3  # of the cost: a search that gains less is not followed by another
 _CONVERGED = 4e-3  # the same for a reported RMS error, which is then known to a fifth of a per cent
@@ -29,13 +29,10 @@ _NO_NUISANCES = np.zeros(0)
 
 @dataclass(frozen=True)
 class Fit:
-    """A structure fitted to trials. `starts_agreeing` of `starts` ended at the best cost: evidence that the remaining
-    misfit is not a failure of the optimiser."""
+    """A structure fitted to trials."""
 
     problem: Problem
     solution: Solution
-    starts: int
-    starts_agreeing: int
 
     @property
     def structure(self) -> Structure:
@@ -89,6 +86,16 @@ class Fit:
         return self.problem.scaled(self.predictions())
 
 
+def rms_by_channel(trials: Sequence[Record], residuals: Iterable[Channels]) -> dict[tuple[str, str], float]:
+    """RMS of the `residuals` of these trials that exist, by (experiment, channel), every trial weighted equally."""
+    squares: dict[tuple[str, str], list[float]] = {}
+    for trial, channels in zip(trials, residuals, strict=True):
+        for channel, residual in channels.items():
+            if (known := residual[np.isfinite(residual)]).size:
+                squares.setdefault((trial.experiment, channel), []).append(float(np.mean(known**2)))
+    return {key: float(np.sqrt(np.mean(values))) for key, values in squares.items()}
+
+
 def fit(
     structure: Structure,
     trials: Sequence[Record],
@@ -99,37 +106,25 @@ def fit(
     relative: float = REL_TOL,
     graduated: bool = False,
 ) -> Fit:
-    """Fit all parameters of `structure` from each of `starts` (vectors; default: its own start) and keep the best.
-    `graduated`: see `solve_graduated`."""
+    """Fit `structure` from each of `starts` (vectors; default: its own start), and keep the best."""
     problem = Problem(structure, trials, floor)
-    vectors = list(starts) or [structure.start()]
     options: dict[str, Any] = {"max_iterations": max_iterations, "relative": relative}
-    if graduated:
-        solutions = [solve_graduated(problem, v, **options) for v in vectors]
-    else:
-        solutions = [solve(problem, problem.start(v), **options) for v in vectors]
-    return best_of(problem, solutions)
-
-
-def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
-    """Return the solution of least cost as a fit, with the number of solutions that agree with it."""
-    best = min(solutions, key=lambda s: s.cost)
-    margin = max(1.0, _SAME_COST * best.cost)
-    agreeing = sum(s.cost < best.cost + margin for s in solutions)
-    return Fit(problem, best, len(solutions), agreeing)
+    solutions = [
+        solve_graduated(problem, values, **options) if graduated else solve(problem, problem.start(values), **options)
+        for values in list(starts) or [structure.start()]
+    ]
+    return Fit(problem, min(solutions, key=lambda s: s.cost))
 
 
 def refit_on(
     fitted: Fit, trials: Sequence[Record], *, near: Sequence[Fit], max_iterations: int = 20, relative: float = REL_TOL
 ) -> Fit:
-    """Refit the structure to other trials, starting from the fitted values. `near`: fits that together contain the
-    nuisances of all these trials."""
+    """Refit to other trials from the fitted values. `near`: fits that together have these trials' nuisances."""
     problem = fitted.problem.over(trials)
     known = {name: nuisances for one in near for name, nuisances in _by_name(one).items()}
     start = Point(fitted.solution.point.values, tuple(known[t.name] for t in trials))
     options: dict[str, Any] = {"max_iterations": max_iterations, "relative": relative}
-    solution = continue_search(problem, solve(problem, start, **options), restart_nuisances=False, **options)
-    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+    return Fit(problem, continue_search(problem, solve(problem, start, **options), restart_nuisances=False, **options))
 
 
 def converged(fitted: Fit) -> Fit:
@@ -140,7 +135,7 @@ def converged(fitted: Fit) -> Fit:
     solution = solve(problem, fitted.solution.point, **options)
     if not fitted.structure.sites:  # curves have many parameters, and their fits are not compared with others
         solution = continue_search(problem, solution, min_gain=_CONVERGED, **options)
-    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+    return Fit(problem, solution)
 
 
 def continue_search(
@@ -151,13 +146,11 @@ def continue_search(
     restart_nuisances: bool = True,
     **options: Any,
 ) -> Solution:
-    """Continue from `solution` with further searches for as long as one gains the share `min_gain` of the cost.
-
-    Each round searches on with the nuisances as they are, unless that has converged, and (`restart_nuisances`) while
-    that helps, also with the nuisances restarted at their means. If the model predicts a jump slightly early or late, a
+    """Continue from `solution` with further searches for as long as one gains the share `min_gain` of the cost. Each
+    round searches on with the nuisances as they are, unless that has converged, and (`restart_nuisances`) while that
+    helps, also with the nuisances restarted at their means: if the model predicts a jump slightly early or late, a
     nuisance and a parameter of similar effect (a run's friction and the friction) hold each other in place until a
-    search releases one of them.
-    """
+    search releases one."""
     restart_nuisances = restart_nuisances and any(problem.nuisances)
     for _ in range(_ROUNDS):
         further = [] if solution.converged else [solve(problem, solution.point, **options)]
@@ -188,13 +181,11 @@ def refit_at_misfit(fitted: Fit) -> Fit:
 def relax_priors(fitted: Fit) -> Fit:
     """Return the fit, its parameters unchanged, with relaxed priors on those with `Parameter.prior_from_trials`."""
     problem = fitted.problem.with_prior(relax_priors=True)
-    cost = cost_of(problem, fitted.solution.point)
-    return Fit(problem, replace(fitted.solution, cost=cost), fitted.starts, fitted.starts_agreeing)
+    return Fit(problem, replace(fitted.solution, cost=cost_of(problem, fitted.solution.point)))
 
 
 def predictive(fitted: Fit) -> Fit:
-    """Return the fit with each run's factors of parameters (`Parameter.factor_of`) at their means, as for a prediction
-    made before the run."""
+    """Return the fit with each run's `Parameter.factor_of` factors at their means, as they are before the run."""
     problem, point = fitted.problem, fitted.solution.point
     if not any(p.factor_of for parameters in problem.nuisances for p in parameters):
         return fitted
@@ -203,8 +194,7 @@ def predictive(fitted: Fit) -> Fit:
         for values, parameters in zip(point.nuisances, problem.nuisances, strict=True)
     )
     point = replace(point, nuisances=expected)
-    solution = replace(fitted.solution, point=point, cost=cost_of(problem, point))
-    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+    return Fit(problem, replace(fitted.solution, point=point, cost=cost_of(problem, point)))
 
 
 def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
@@ -215,19 +205,17 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
     sensitivities = fitted.solution.sensitivities
     if not max_iterations:
         bare = replace(fitted.solution, cost=cost_of(problem, point), normal=np.zeros((0, 0)), sensitivities=())
-        return Fit(problem, bare, fitted.starts, fitted.starts_agreeing)
+        return Fit(problem, bare)
     known = None  # derivatives are recomputed
     if sensitivities:
         pairs = zip(problem.slopes(point), fitted.problem.slopes(point), strict=True)
         known = [s.reweighed(new / old) for s, (new, old) in zip(sensitivities, pairs, strict=True)]
-    solution = solve(problem, point, max_iterations=max_iterations, sensitivities=known)
-    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+    return Fit(problem, solve(problem, point, max_iterations=max_iterations, sensitivities=known))
 
 
 def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = None) -> Fit:
-    """Evaluate the fitted parameters on other trials, estimating only these trials' nuisances, starting from those in
-    `near` where it has them. Each trial is estimated once per fit. The cost covers these trials alone: the prior cost
-    of the parameters is already counted in their own fit."""
+    """Evaluate the fitted parameters on other trials, estimating only these trials' nuisances, from those in `near` if
+    it has them, once per fit. The prior cost of the parameters is not counted again."""
     known, values = fitted.known_nuisances, fitted.solution.point.values
     unknown = fitted.problem.over([t for t in trials if t.name not in known])
     if any(unknown.nuisances):
@@ -238,13 +226,12 @@ def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = Non
         for view in dict.fromkeys((PLAIN, unknown.view) if far else (unknown.view,)):
             found = solve(unknown.seen(view), point, free=(), max_iterations=_NUISANCE_ITERATIONS)
             point = found.point
-        known |= _by_name(Fit(unknown, found, 1, 1))
+        known |= _by_name(Fit(unknown, found))
     # if all trials were just estimated, their residuals are still cached
     problem = unknown if len(unknown.trials) == len(trials) else fitted.problem.over(trials)
     point = Point(values, tuple(known.get(t.name, _NO_NUISANCES) for t in problem.trials))
     cost = cost_of(problem, point) - problem.structure_prior_cost(point)
-    solution = Solution(point, cost, True, (), np.zeros((0, 0)), ())
-    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+    return Fit(problem, Solution(point, cost, True, (), np.zeros((0, 0)), ()))
 
 
 def _by_name(fitted: Fit) -> dict[str, np.ndarray]:
@@ -253,11 +240,9 @@ def _by_name(fitted: Fit) -> dict[str, np.ndarray]:
 
 
 def spread_starts(structure: Structure, around: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
-    """Return `around` and count - 1 random vectors within the bounds; deterministic for a given `seed`.
-
-    A parameter is drawn uniformly from its plausible range, else from its prior, else within a few scales of `around`.
-    The size of an effect is drawn from the range of its start sizes, with either sign if the bounds allow it.
-    """
+    """Return `around` and count - 1 random vectors within the bounds; deterministic for a given `seed`. A parameter is
+    drawn uniformly from its plausible range, else from its prior, else within a few scales of `around`; the size of an
+    effect from the range of its start sizes, with either sign if the bounds allow it."""
     draw = np.random.default_rng(seed)
     return [around, *(_random_start(structure, around, draw) for _ in range(count - 1))]
 
@@ -291,9 +276,3 @@ def fit_base(system: System, trials: Sequence[Record]) -> Fit:
         if fallen >= REFIT_SHARE:
             break
     return found
-
-
-def starting_point(fitted: Fit, structure: Structure) -> np.ndarray:
-    """Return a vector of `structure` for a warm start: parameters in common with `fitted` keep their values."""
-    common = {name: value for name, value in fitted.theta.items() if name in structure.names}
-    return structure.values(structure.theta(structure.start()) | common)

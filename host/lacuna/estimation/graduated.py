@@ -30,8 +30,7 @@ _NEGLIGIBLE_COST, _MAX_COST_RATIO = 0.02, 3.0
 def solve_graduated(
     problem: Problem, values: np.ndarray, *, max_iterations: int, relative: float = REL_TOL
 ) -> Solution:
-    """Minimise the cost from `values`, which may be far from the optimum. Parameters with a declared prior start at its
-    mean and stay there until the others are close."""
+    """Minimise the cost from distant `values`. Parameters with a prior stay at its mean until the others are close."""
     structure, every = problem.structure, range(len(values))
     isolated = problem.over([t for t in problem.trials if structure.system.isolates(t)])
     free = [i for i, p in enumerate(structure.parameters) if p.prior_sd is None]

@@ -89,8 +89,7 @@ class NoiseFloor:
         return max(others, key=lambda noise: noise.per_piece)
 
     def sd(self, trial: Record, channel: str) -> np.ndarray:
-        """Standard deviation of each sample of a trial, shape (n,); larger where the record moves fast, and where the
-        reading is large if the noise grows with it."""
+        """Standard deviation of each sample, shape (n,); larger where a record moves fast or noise grows with it."""
         noise = self.of(trial.experiment, channel)
         if not (noise.jitter_s or noise.grows):
             return np.full(trial.time_s.shape, noise.sd)
@@ -113,20 +112,14 @@ class NoiseFloor:
         """Smallest ratio of this floor to `other` over all channels."""
         return min(n.per_piece / other.channels[k].per_piece for k, n in self.channels.items())
 
-    def samples_per_piece(self, trial: Record, channel: str) -> float:
-        """Number of a trial's neighbouring samples that count as one independent observation."""
-        return self.of(trial.experiment, channel).samples_per_piece
-
 
 def estimate_noise(
     system: System, trials: Sequence[Record], residuals: Mapping[str, Channels] | None = None
 ) -> NoiseFloor:
-    """Estimate the noise floor of `trials` from the differences between repeats.
-
-    If given, `residuals` (measured minus predicted, by trial name and channel) are used instead of the measurements.
-    They give a sharper estimate, because the fit accounts for each trial's nuisances, and model errors that repeats
-    have in common cancel. A channel without repeats gets its floor from fast noise, or from `System.noise_time_s`.
-    """
+    """Estimate the noise floor of `trials` from the differences between repeats. If given, `residuals` (measured minus
+    predicted, by trial name and channel) are used instead of the measurements: a sharper estimate, because the fit
+    accounts for each trial's nuisances, and model errors that repeats have in common cancel. A channel without repeats
+    gets its floor from fast noise, or from `System.noise_time_s`."""
     measured = {trial.name: trial.channels for trial in trials}
     basis = measured if residuals is None else residuals
     by_key: dict[tuple[str, str], list[tuple[Record, Record]]] = defaultdict(list)
@@ -179,8 +172,7 @@ def _from_pairs(
 
 
 def _growing(noise: ChannelNoise, readings: np.ndarray, differences: np.ndarray, least: float) -> ChannelNoise:
-    """Return `noise` with the constant share of the variance that is likeliest by the differences at `readings`, both
-    of shape (n,), and nowhere below `least`."""
+    """Return `noise` with the likeliest constant share of the variance by `differences` at `readings`, shape (n,)."""
     reading = float(np.sqrt(np.nanmean(readings**2)))
     if not reading > 0.0:
         return noise
@@ -290,8 +282,7 @@ def _jitter(
 def _shift_variance(
     time_s: np.ndarray, samples: np.ndarray, jitter_s: float, sd: np.ndarray, where: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
-    """Mean square change of the samples `where` of a smooth record under a random shift in time, less the contribution
-    of the record's own noise."""
+    """Mean square change of the samples `where` under a random shift in time, less that of the record's own noise."""
     known = np.isfinite(samples)
     if known.sum() < 2:
         return np.zeros(samples[where].shape)
@@ -307,8 +298,7 @@ def _smooth(samples: np.ndarray) -> np.ndarray:
 
 
 def _min_sd(trials: Sequence[Record], channel: str) -> float:
-    """Lower bound of a floor: the rounding error, and 1e-4 of the channel's spread, so that noise-free records do not
-    get infinite weights."""
+    """Lower bound of a floor: rounding, and 1e-4 of the channel's spread, so that no weight is infinite."""
     spread = max(float(np.nanstd(trial.channels[channel])) for trial in trials)
     rounded = max(_rounding_step(trial.channels[channel]) for trial in trials)
     return max(1e-4 * spread, rounded / np.sqrt(12.0)) or 1e-12
@@ -323,19 +313,15 @@ def _rounding_step(samples: np.ndarray) -> float:
     steps = steps[steps > _SAME_VALUE * np.ptp(known)] if len(steps) else steps  # without rounding errors
     if len(steps) < 2:
         return 0.0
-    step, written = _common_step(steps), _last_decimal(values)
+    single = float(np.mean(steps[steps < 1.5 * steps.min()]))  # a first estimate, refined with all steps
+    step = float(steps.sum() / np.maximum(np.round(steps / single), 1.0).sum())
+    written = _last_decimal(values)
     off_the_grid = np.abs(steps - np.round(steps / step) * step)
     near = max(_GRID_REL_TOL * step, written if written < step / 3.0 else 0.0)
     recur = len(steps) + 1 < _MAX_DISTINCT_SHARE * len(known) and bool((off_the_grid <= near).all())
     if recur:
         return step
     return float(steps.min()) if np.mean(np.diff(known) == 0.0) > 0.5 else 0.0
-
-
-def _common_step(steps: np.ndarray) -> float:
-    """Estimate the step of which all `steps` are multiples: first from the shortest ones, then refined with all."""
-    single = float(np.mean(steps[steps < 1.5 * steps.min()]))
-    return float(steps.sum() / np.maximum(np.round(steps / single), 1.0).sum())
 
 
 def _last_decimal(values: np.ndarray) -> float:

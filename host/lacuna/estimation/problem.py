@@ -97,9 +97,8 @@ class Problem:
     """The residuals of `trials` under a structure, weighted by a noise floor.
 
     A residual is (predicted - measured) / sd / sqrt(samples per independent piece), so that half the sum of squares is
-    minus a log-likelihood that counts independent pieces of information, not samples. Beyond `view.soft_limit` standard
-    deviations it is compressed (asinh), so that a jump predicted at a slightly wrong time does not outweigh everything
-    else.
+    minus a log-likelihood that counts independent pieces of information, not samples. Large ones are compressed
+    (`View`), so that a jump predicted at a slightly wrong time does not outweigh everything else.
     """
 
     def __init__(self, structure: Structure, trials: Sequence[Record], floor: NoiseFloor, view: View = SHARP):
@@ -122,9 +121,8 @@ class Problem:
         return vars(self) | {"_recent": {}}
 
     def start(self, values: np.ndarray | None = None, known: Sequence[np.ndarray] | None = None) -> Point:
-        """Return a point to start from: the structure's vector `values` (default: its start) with nuisances at their
-        means, or the leading ones of each trial as `known`. The effects' own parameters of a trial start at the best of
-        a few values."""
+        """Return a point to start from: the structure's vector `values` (default: its start), nuisances at their means
+        or as `known` (the leading ones of each trial), and effects' own parameters at the best of a few values."""
         start = self.structure.start() if values is None else np.asarray(values, float)
         nuisances = [np.array([p.value for p in ps]) for ps in self.nuisances]
         for mine, given in zip(nuisances, known or (), strict=False):
@@ -161,15 +159,15 @@ class Problem:
         return other
 
     def predict_all(self, point: Point) -> list[Channels]:
-        """Predictions of every trial; NaN where they diverge."""
-        return self._of_each(point, self._mask_diverged)
+        """Predictions of every trial; NaN where they diverge, since their squares may overflow."""
 
-    def _mask_diverged(self, prediction: Channels, index: int) -> Channels:
-        """Replace diverging samples by NaN: they are no predictions, and their squares may overflow."""
-        trial = self.trials[index]
-        with np.errstate(invalid="ignore"):
-            far = {c: np.abs(prediction[c]) > _MAX_DEVIATION * self._spans[index][c] for c in trial.channels}
-        return {c: np.where(far[c], np.nan, prediction[c]) if far[c].any() else prediction[c] for c in trial.channels}
+        def masked(prediction: Channels, index: int) -> Channels:
+            spans = self._spans[index]
+            with np.errstate(invalid="ignore"):
+                far = {c: np.abs(prediction[c]) > _MAX_DEVIATION * span for c, span in spans.items()}
+            return {c: np.where(far[c], np.nan, prediction[c]) if far[c].any() else prediction[c] for c in spans}
+
+        return self._of_each(point, masked)
 
     def residuals(self, point: Point) -> list[np.ndarray]:
         """Weighted residuals, one vector per trial, with the channels one after the other."""
@@ -262,8 +260,7 @@ class Problem:
     def changes(
         self, index: int, here: tuple[np.ndarray, np.ndarray], moved: Sequence[tuple[Any, ...]], *, coarse: bool = False
     ) -> np.ndarray:
-        """Changes of a trial's residuals, shape (len(moved), n), from `here` to each nearby point in `moved`; a point
-        is the structure's values and the trial's nuisances."""
+        """Changes of a trial's residuals, shape (len(moved), n), from `here` to nearby points (values, nuisances)."""
         predictions = self._simulate([here, *moved], index, coarse=coarse, alike=True)
         first, weight = self._apply_view(self._deviations(predictions[:1], index), index)
         with np.errstate(over="ignore", invalid="ignore"):  # handled below
@@ -291,7 +288,12 @@ class Problem:
 
     def slopes(self, point: Point) -> list[np.ndarray]:
         """Derivative of each residual with respect to its prediction, one vector per trial, shapes as `residuals`."""
-        return self._of_each(point, self._slope)
+
+        def slope(prediction: Channels, index: int) -> np.ndarray:
+            weighing, deviations = self._weighing[index], self._deviations([prediction], index)[0]
+            return weighing.weight * weighing.thinning / np.hypot(1.0, deviations / self.view.soft_limit)
+
+        return self._of_each(point, slope)
 
     def _of_each(self, point: Point, finish: Callable[[Channels, int], Any], *, coarse: bool = False) -> list[Any]:
         """Simulate every trial and return `finish(prediction, index)` for each."""
@@ -334,8 +336,7 @@ class Problem:
         return np.arcsinh(z / limit) * (self.view.soft_limit * weight)
 
     def _apply_view(self, z: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deviations as the view smooths them, and their weights. With blur, every channel is low-pass
-        filtered on an even time grid and decimated accordingly."""
+        """Return the deviations, with blur low-pass filtered and decimated on an even grid, and their weights."""
         weight, ends = self._weighing[index].thinning, self._weighing[index].ends
         if not self.view.blur:
             return z, weight
@@ -347,10 +348,6 @@ class Problem:
             found.append(np.cumsum(recent / kept, axis=1) * kept)
             weights.append(w_[every - 1 :: every] * np.sqrt(every))
         return np.concatenate(found, axis=1), np.concatenate(weights)
-
-    def _slope(self, prediction: Channels, index: int) -> np.ndarray:
-        weighing, deviations = self._weighing[index], self._deviations([prediction], index)[0]
-        return weighing.weight * weighing.thinning / np.hypot(1.0, deviations / self.view.soft_limit)
 
     def _deviations(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Uncompressed residuals in standard deviations, a row for each prediction."""
@@ -371,9 +368,8 @@ class Problem:
 
 
 class _Weighing(NamedTuple):
-    """Weights of a trial's samples, one channel after the other. `keep` marks the samples that were measured; for
-    these: the values, 1 / standard deviation (`weight`), 1 / sqrt(samples per piece) (`thinning`), and the indices at
-    which all channels but the last end."""
+    """Weights of a trial's samples, one channel after the other. `keep` marks those that were measured; for these: the
+    values, 1 / standard deviation, 1 / sqrt(samples per piece), and where all channels but the last end."""
 
     keep: np.ndarray
     measured: np.ndarray
@@ -386,7 +382,7 @@ class _Weighing(NamedTuple):
         channels = trial.channels
         measured = np.concatenate([*channels.values()])
         weight = np.concatenate([1.0 / floor.sd(trial, c) for c in channels])
-        shares = [floor.samples_per_piece(trial, c) ** -0.5 for c in channels]
+        shares = [floor.of(trial.experiment, c).samples_per_piece ** -0.5 for c in channels]
         thinning = np.repeat(shares, [v.size for v in channels.values()])
         keep = np.isfinite(measured)
         ends = np.cumsum([np.isfinite(v).sum() for v in channels.values()])[:-1]
@@ -412,12 +408,8 @@ def _pack_trials(trials: Sequence[Record], at_once: int) -> list[list[int]]:
     experiments: dict[str, list[int]] = {}
     for i, trial in enumerate(trials):
         experiments.setdefault(trial.experiment, []).append(i)
-    packs: list[list[int]] = []
-    for members in experiments.values():
-        for k in range(0, len(members), at_once):
-            pack = members[k : k + at_once]
-            packs += [pack] if len(pack) >= _MIN_PACK_SIZE else [[i] for i in pack]
-    return packs
+    full = (members[k : k + at_once] for members in experiments.values() for k in range(0, len(members), at_once))
+    return [part for pack in full for part in ([pack] if len(pack) >= _MIN_PACK_SIZE else [[i] for i in pack])]
 
 
 def _stepped(values: np.ndarray, index: int, parameter: Parameter, step: float) -> tuple[np.ndarray, float]:

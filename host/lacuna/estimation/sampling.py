@@ -1,5 +1,4 @@
-"""Resampling of uneven records to an even grid, for rules that count samples, and the amount of independent
-information in correlated samples."""
+"""Resampling of uneven records to even times, and the amount of independent information in correlated samples."""
 
 from __future__ import annotations
 
@@ -50,11 +49,9 @@ def sample_period(time_s: np.ndarray) -> float:
 
 def correlation_samples(traces: Sequence[np.ndarray]) -> float:
     """Number of neighbouring samples that count as one: 1 + 2 sum of the autocorrelations, pooled over `traces`, which
-    are in units of their noise and evenly sampled.
-
-    The mean is not subtracted, so a trace with a constant offset rightly counts as two or three pieces. Missing samples
-    (NaN) form no pairs, and samples on either side of a gap keep their true distance.
-    """
+    are in units of their noise and evenly sampled. The mean is not subtracted, so a trace with a constant offset
+    rightly counts as two or three pieces. Missing samples (NaN) form no pairs, and those on either side of a gap keep
+    their distance."""
     traces = [trace for trace in traces if np.isfinite(trace).any()]
     longest = max(1, min((len(t) for t in traces), default=0) // 4)
     total, pair_counts, lags = np.zeros(longest + 1), np.zeros(longest + 1), np.arange(longest + 1)

@@ -25,11 +25,6 @@ class Sensitivity:
     right: np.ndarray
     structure: int
 
-    @property
-    def nuisances(self) -> int:
-        """Number of nuisances, q."""
-        return self.gram.shape[0] - self.structure
-
     @classmethod
     def of(cls, differences: np.ndarray, active: ArrayLike, structure: int, nuisances: int) -> Sensitivity:
         """Derivatives from finite differences, without corrections."""
@@ -62,7 +57,7 @@ class Sensitivity:
 
     def reweighed(self, factors: np.ndarray) -> Sensitivity:
         """Multiply the derivatives of every residual by its own factor; `factors` has shape (n,)."""
-        return self.of(self._rows * factors, self.active, self.structure, self.nuisances)
+        return self.of(self._rows * factors, self.active, self.structure, len(self.gram) - self.structure)
 
     def dense(self) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives with respect to the structure's parameters, shape (n, p), and the nuisances, shape (n, q)."""

@@ -31,9 +31,8 @@ _MAX_STEP_SCALES = 1.0  # scales: longest step of a derivative, in directions th
 
 @dataclass(frozen=True)
 class _Directions:
-    """Steps of the derivatives. `structure`, shape (P, P): steps in the free parameters, a direction per column. For
-    each trial, `following`, shape (q, P): the accompanying steps of its nuisances; `spread`, shape (q,): the steps of
-    each nuisance alone."""
+    """Steps of the derivatives. `structure`, shape (P, P): in the free parameters, a direction per column. For each
+    trial, `following`, shape (q, P): those of its nuisances with them; `spread`, shape (q,): of each alone."""
 
     structure: np.ndarray
     following: tuple[np.ndarray, ...]
@@ -83,8 +82,7 @@ def _directions(problem: Problem, solution: Solution) -> _Directions:
 
 
 def _step_factors(problem: Problem, solution: Solution, directions: np.ndarray) -> np.ndarray:
-    """Factor for each direction, -1 to 1, that keeps its step within the bounds; negative if there is more room the
-    other way."""
+    """Factor for each direction, -1 to 1, that keeps its step within the bounds; negative if back has more room."""
     free = list(solution.free)
     values = solution.point.values[free]
     lower, upper = (bound[free] for bound in problem.structure.bounds(solution.point.values))
@@ -105,8 +103,7 @@ def _is_as_predicted(along: _Directions, before: np.ndarray, after: np.ndarray) 
 
 
 def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _Directions) -> list[Sensitivity]:
-    """Derivatives of each trial with respect to the free parameters and its nuisances, from differences along the
-    directions."""
+    """Derivatives of each trial (free parameters, its nuisances), from differences along the directions."""
     values = np.tile(point.values, (len(free), 1))
     values[:, list(free)] += along.structure.T
     back = np.linalg.inv(along.structure)

@@ -14,7 +14,7 @@ import numpy as np
 
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.solve import solve
-from lacuna.estimation.structure import knot_name
+from lacuna.estimation.structure import knot_names
 from lacuna.estimation.uncertainty import uncertainty
 
 _UPDATES = 100
@@ -31,8 +31,7 @@ def shrunk(fitted: Fit) -> Fit:
     values, sizes, known = solution.point.values.copy(), {}, uncertainty(fitted).covariance
     for name in structure.sites:
         site = structure.system.correction_sites[name]
-        knots = [knot_name(site, row, knot) for row in range(len(site.rows)) for knot in range(site.knots)]
-        places = np.array([structure.names.index(knot) for knot in knots])
+        places = np.array([structure.names.index(knot) for row in knot_names(site) for knot in row])
         own = np.array([solution.free.index(place) for place in places])
         sizes[name], determined = likeliest_size(values[places], known[np.ix_(own, own)], _MIN_SIZE * site.scale)
         values[places[~determined]] = 0.0

@@ -51,8 +51,7 @@ class Solution:
 
     @property
     def jacobians(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Derivatives of each trial's residuals with respect to the free parameters and to its nuisances, shapes (n, P)
-        and (n, q)."""
+        """Derivatives of each trial's residuals by the free parameters and by its nuisances, shapes (n, P), (n, q)."""
         return [s.dense() for s in self.sensitivities]
 
 
@@ -107,7 +106,9 @@ def solve(
         steps = problem.tuned_steps(steps, free, [np.diag(s.gram) for s in sensitivities])
         sensitivities, age = problem.jacobians(here.point, free, steps), 0
     normal, _ = _linearize(problem, here, free, sensitivities)
-    return Solution(here.point, here.cost, converged, free, _eliminate(normal, len(free)), tuple(sensitivities))
+    p = len(free)  # the others are marginalised (Schur complement)
+    normal = normal[:p, :p] - normal[:p, p:] @ np.linalg.solve(normal[p:, p:], normal[p:, :p])
+    return Solution(here.point, here.cost, converged, free, normal, tuple(sensitivities))
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,7 @@ def _corrected(
     sensitivities: Sequence[Sensitivity], before: _State, after: _State, scale: np.ndarray, p: int
 ) -> tuple[Sensitivity, ...]:
     found, step = [], after.x - before.x
-    places = _nuisance_slices((one.nuisances for one in sensitivities), p)
+    places = _nuisance_slices(map(len, before.point.nuisances), p)
     for one, own, old, new in zip(sensitivities, places, before.residuals, after.residuals, strict=True):
         moved, sizes = (np.concatenate([v[:p], v[own]]) for v in (step, scale))
         found.append(one.corrected(moved, sizes, new - old))
@@ -261,8 +262,3 @@ def _step(
         stopped |= crossing
     step = np.clip(x + step, lower, upper) - x
     return step, float(-(gradient @ step + 0.5 * step @ normal @ step))
-
-
-def _eliminate(normal: np.ndarray, p: int) -> np.ndarray:
-    """Normal matrix of the first p unknowns with the others marginalised (Schur complement)."""
-    return normal[:p, :p] - normal[:p, p:] @ np.linalg.solve(normal[p:, p:], normal[p:, :p])

@@ -29,8 +29,13 @@ class Structure:
         for name in self.effects:
             effect = self.system.effects[name]
             found += [replace(p, name=effect.full_name(p)) for p in effect.parameters]
-        for name in self.sites:
-            found += _knot_parameters(self.system.correction_sites[name])
+        for site in (self.system.correction_sites[name] for name in self.sites):
+            far = 50 * site.scale
+            found += [
+                Parameter(knot, site.unit, 0.0, -far, far, scale=site.scale, source="learnt")
+                for row in knot_names(site)
+                for knot in row
+            ]
         return tuple(found)
 
     @cached_property
@@ -50,14 +55,11 @@ class Structure:
             for p in effect.own
         )
 
-    @property
-    def base_size(self) -> int:
-        return len(self.system.parameters)
-
-    def start(self) -> np.ndarray:
-        """Initial vector: the base at its start, effects absent with typical shape parameters, corrections zero."""
+    def start(self, known: Theta | None = None) -> np.ndarray:
+        """Initial vector: parameters that are not `known` at their initial values, effects absent, corrections zero."""
         effects = [self.system.effects[name] for name in self.effects]
-        return self.values({size: effect.absent for effect in effects for size in effect.size_names})
+        absent = {size: effect.absent for effect in effects for size in effect.size_names}
+        return self.values(absent | dict(known or {}))
 
     def prior_mean(self) -> np.ndarray:
         return np.array([p.value for p in self.parameters])
@@ -77,8 +79,7 @@ class Structure:
         return values
 
     def separate_ordered(self, values: np.ndarray, effect: str) -> np.ndarray:
-        """Return `values` with the parameters in `Effect.apart` raised to at least half their initial distance above
-        their limits (`Parameter.at_least`)."""
+        """Return `values` with parameters in `Effect.apart` at least half their initial distance above their limits."""
         values, start = values.copy(), self.start()
         for index, floor in self.ordered:
             if self.names[index] in self.system.effects[effect].apart:
@@ -106,15 +107,17 @@ class Structure:
 
     def corrections(self, theta: Theta) -> tuple[Correction, ...]:
         """Return the learnt curves, interpolated from their knots onto a uniform table by a natural cubic spline."""
-        return tuple(_tabulate(self.system.correction_sites[name], theta) for name in self.sites)
+        found = []
+        for site in (self.system.correction_sites[name] for name in self.sites):
+            knots = np.array([[theta[knot] for knot in row] for row in knot_names(site)])
+            found.append(Correction(site.name, knots @ _splines(site.knots)))
+        return tuple(found)
 
     def prior_precision(self, relax_priors: bool = False, sizes: Mapping[str, float] | None = None) -> np.ndarray:
-        """Precision of the prior around the initial values, shape (P, P).
-
-        It holds the declared priors, and for learnt curves knots within 10 scales of zero (or within the site's entry
-        in `sizes`) and second differences within 3 scales. `relax_priors` relaxes priors that were estimated from the
-        trials themselves, so that these do not count twice.
-        """
+        """Precision of the prior around the initial values, shape (P, P): the declared priors, and for learnt curves
+        knots within 10 scales of zero (or within the site's entry in `sizes`) and second differences within 3 scales.
+        `relax_priors` relaxes priors that were estimated from the trials themselves, so that these do not count
+        twice."""
         wider = [_RELAXED_FACTOR if relax_priors and p.prior_from_trials else 1.0 for p in self.parameters]
         sds = zip((p.prior_sd for p in self.parameters), wider, strict=True)
         precision = np.diag([(sd * factor) ** -2.0 if sd else 0.0 for sd, factor in sds])
@@ -123,22 +126,18 @@ class Structure:
             bend = np.diff(np.eye(site.knots), 2, axis=0)
             scales = sizes[name] / site.scale if sizes and name in sizes else 10
             block = (np.eye(site.knots) / scales**2 + bend.T @ bend / 3**2) / site.scale**2
-            for row in range(len(site.rows)):
-                at = self.names.index(knot_name(site, row, 0))
+            for row in knot_names(site):
+                at = self.names.index(row[0])
                 precision[at : at + site.knots, at : at + site.knots] = block
         return precision
 
     def moves(self, index: int, trial: Record) -> bool:
         """Whether parameter `index` can change a trial."""
-        if index < self.base_size:
+        if index < len(self.system.parameters):
             return self.system.matters(self.names[index], trial)
-        owner = self.names[index].split(".")
-        experiments = (
-            self.system.correction_sites[owner[1]].experiments
-            if owner[0] == LEARNT
-            else self.system.effects[owner[0]].experiments
-        )
-        return not experiments or trial.experiment in experiments
+        owner, own = self.names[index].split(".")[:2]
+        acting = self.system.correction_sites[own] if owner == LEARNT else self.system.effects[owner]
+        return not acting.experiments or trial.experiment in acting.experiments
 
 
 def is_learnt(name: str) -> bool:
@@ -146,30 +145,14 @@ def is_learnt(name: str) -> bool:
     return name.startswith(f"{LEARNT}.")
 
 
-def knot_name(site: CorrectionSite, row: int, knot: int) -> str:
-    """Name of the parameter for a knot of a learnt curve."""
-    return f"{LEARNT}.{site.name}.{row}_{knot}"
-
-
-def _knot_parameters(site: CorrectionSite) -> list[Parameter]:
-    far = 50 * site.scale
-    return [
-        Parameter(knot_name(site, row, knot), site.unit, 0.0, -far, far, scale=site.scale, source="learnt")
-        for row in range(len(site.rows))
-        for knot in range(site.knots)
-    ]
-
-
-def _tabulate(site: CorrectionSite, theta: Mapping[str, float]) -> Correction:
-    rows = range(len(site.rows))
-    values = np.array([[theta[knot_name(site, row, k)] for k in range(site.knots)] for row in rows])
-    return Correction(site.name, values @ _splines(site.knots))
+def knot_names(site: CorrectionSite) -> list[list[str]]:
+    """Names of the parameters for the knots of a site's curves, a list for each row."""
+    return [[f"{LEARNT}.{site.name}.{row}_{knot}" for knot in range(site.knots)] for row in range(len(site.rows))]
 
 
 @cache
 def _splines(knots: int) -> np.ndarray:
-    """Basis of natural cubic splines on the table's grid, shape (knots, n): row k is 1 at knot k and 0 at the others.
-    A curve is their sum, weighted by its knots."""
+    """Natural cubic splines on the table's grid, shape (knots, n): row k is 1 at knot k and 0 at the others."""
     each = max(_TABLE_INTERVALS // (knots - 1), 2)  # intervals of the table between neighbouring knots
     at = np.linspace(0, 1, each * (knots - 1) + 1)
     return CubicSpline(np.linspace(0, 1, knots), np.eye(knots), bc_type="natural")(at).T

@@ -134,8 +134,7 @@ def _walk_out(fitted: Fit, index: int, others: tuple[int, ...], stride: float, b
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """90 % interval of every parameter of a settled fit, within its bounds: from the curvature of the likelihood or
-    from the disagreement between conditions, whichever is wider, with Student's t for one degree of freedom less than
-    there are conditions."""
+    from the disagreement between conditions, whichever is wider, with Student's t (conditions - 1)."""
     known = uncertainty(fitted)
     variance = np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fitted)))
     variance += fitted.structure.grains()[list(fitted.solution.free)] ** 2 / 12.0  # uniform within a step
@@ -150,9 +149,8 @@ def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
 
 
 def clustered_covariance(fit: Fit) -> np.ndarray:
-    """Jackknife covariance of the free parameters, shape (P, P), from how far the optimum moves when one condition of
-    an experiment is left out. First order fails for a direction that a single condition determines almost alone; it
-    moves as if a tenth of its information remained."""
+    """Jackknife covariance of the free parameters, shape (P, P), from how far the optimum moves without one condition:
+    to first order, and where a single condition determines a direction, as if a tenth of its information remained."""
     solution = fit.solution
     units = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
     scores: dict[object, np.ndarray] = {}
@@ -167,14 +165,12 @@ def clustered_covariance(fit: Fit) -> np.ndarray:
     values, vectors = np.linalg.eigh(solution.normal / np.outer(units, units))
     kept = values > _MIN_INFORMATION * values.max()
     root = vectors[:, kept] / np.sqrt(values[kept])  # of the covariance; whitens the parameters
-    moves = np.array([root @ _optimum_shift(root.T @ normals[key] @ root, root.T @ scores[key]) for key in scores])
+    shifts = []
+    for condition, score in scores.items():
+        left, directions = np.linalg.eigh(np.eye(root.shape[1]) - root.T @ normals[condition] @ root)
+        shifts.append(root @ (directions @ (directions.T @ (root.T @ score) / np.maximum(left, _MIN_REMAINING))))
+    moves = np.array(shifts)
     return (clusters - 1) / clusters * moves.T @ moves / np.outer(units, units)
-
-
-def _optimum_shift(share: np.ndarray, score: np.ndarray) -> np.ndarray:
-    """Shift of the optimum without a condition that contributes `share`, shape (P, P), of all information."""
-    left, directions = np.linalg.eigh(np.eye(len(share)) - share)
-    return directions @ (directions.T @ score / np.maximum(left, _MIN_REMAINING))
 
 
 def _scores_and_information(fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -202,7 +198,8 @@ def effective_samples(fitted: Fit) -> float:
 
 def pieces_of(trial: Record, floor: NoiseFloor) -> float:
     """Number of independent pieces of information in one trial."""
-    return sum(np.isfinite(v).sum() / floor.samples_per_piece(trial, c) for c, v in trial.channels.items())
+    counts = {channel: np.isfinite(samples).sum() for channel, samples in trial.channels.items()}
+    return sum(count / floor.of(trial.experiment, c).samples_per_piece for c, count in counts.items())
 
 
 def _dispersion(fitted: Fit) -> float:

@@ -8,14 +8,14 @@ from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.report.figures import draw_errors, draw_held_out, draw_learnt, draw_tried, draw_weights
-from lacuna.report.measured import floor_sentence, measured_rows
 from lacuna.report.page import Page, PageTable, Section, both_palettes
 from lacuna.report.sentence import next_in_words, number_in_words, own_form, share_in_words, verdict_sentence
+from lacuna.report.text import floor_sentence, pairs_in_words
+from lacuna.system import by_channel
 
 
 def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None = None) -> Page:
-    """Return the page for a `record` (from `as_record`). If the diagnosis `found` is given, the page also describes the
-    measurements and shows traces."""
+    """Return the page for a `record` (from `as_record`), with measurements and traces if `found` is given."""
     error, effects = record["error"], record["effects"]
     meanings = {
         "before": "error of the base model on trials not fitted, in units of the noise",
@@ -103,7 +103,15 @@ def _words(name: str) -> str:
 
 def _measured(found: Diagnosis) -> Section:
     columns = ("channel", "records in conditions", "floor (standard deviation)", "samples per observation", "from")
-    return Section("What was measured", (floor_sentence(found),), (PageTable(columns, measured_rows(found)),))
+    rows = []
+    for (experiment, channel), trials in by_channel(found.base.structure.system.trials).items():
+        noise = found.search.floor.of(experiment, channel)
+        conditions = len({t.condition for t in trials})
+        basis = pairs_in_words(noise.repeats) if noise.repeats else "the fast noise of the residual"
+        piece = f"{noise.samples_per_piece:.3g}"
+        sd = f"{noise.sd:.3g}" + (f" at {noise.reading:.3g}, and grows with the reading" if noise.grows else "")
+        rows.append((f"{experiment}: {channel}", f"{len(trials)} in {conditions}", sd, piece, basis))
+    return Section("What was measured", (floor_sentence(found),), (PageTable(columns, rows),))
 
 
 def _size_text(effect: Mapping[str, Any]) -> str:

@@ -1,5 +1,4 @@
-"""Figures of a diagnosis: an overview, errors, explanations tried, weights of effects, learnt curves, and measured and
-predicted traces of held-out records."""
+"""Figures of a diagnosis: overview, errors, explanations tried, weights, learnt curves, traces of held-out records."""
 
 from __future__ import annotations
 
@@ -65,10 +64,7 @@ def _tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
 
 
 def draw_errors(error: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
-    """Draw errors before and after, and the noise floor, on a logarithmic axis.
-
-    `error`: the `error` object of `bifa diagnose --json`, RMS in units of the noise.
-    """
+    """Draw errors before and after, and the noise floor, on a logarithmic axis. `error`: that of `as_record`."""
     before, after = _bars(error["before"]), _bars(error["after"])
     names = [name for name in before if name in after]
     rows = np.arange(len(names))[::-1]

@@ -28,10 +28,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class PageTable:
-    """Rows of text under column headings. Columns after the first hold numbers and are right-aligned.
-
-    `words`: the last column is text and left-aligned.
-    """
+    """Rows of text under column headings. Columns after the first are right-aligned, except a last one of `words`."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -42,8 +39,7 @@ class PageTable:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with paragraphs, tables, figures and links. To show more, derive from this class and from the
-    template."""
+    """A heading with paragraphs, tables, figures and links; derive from it and from the template to show more."""
 
     title: str
     paragraphs: Sequence[str] = ()

@@ -6,11 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 
-def in_words(effect: Mapping[str, Any]) -> str:
-    """The effect's name, with spaces instead of underscores."""
-    return effect["name"].replace("_", " ")
-
-
 def own_form(effect: Mapping[str, Any]) -> str:
     """Say where an effect acts in a form other than the library's; empty if it does not."""
     _, freed, where = effect["form"].partition("freed: ")
@@ -18,8 +13,7 @@ def own_form(effect: Mapping[str, Any]) -> str:
 
 
 def share_in_words(share: float | None) -> str:
-    """Format a share of the gap, at most 100 %, since errors below the floor are chance. `share` is None if there is no
-    gap, or no trial to measure it on."""
+    """Format a share of the gap (None: there is none), at most 100 %, since errors below the floor are chance."""
     return "no gap was measured" if share is None else f"{100 * min(share, 1.0):.0f} % of the gap"
 
 
@@ -40,11 +34,10 @@ def verdict_sentence(
     verdict: str,
     effects: Sequence[Mapping[str, Any]],
     remainder: Mapping[str, Any],
-    words: Callable[[Mapping[str, Any]], str] = in_words,
+    words: Callable[[Mapping[str, Any]], str] = lambda effect: effect["name"].replace("_", " "),
     nearest: Sequence[Mapping[str, Any]] = (),
 ) -> str:
-    """State a verdict (from `as_record`) in one sentence. `words` returns the name of an effect; `nearest` lists other
-    explanations that were tried."""
+    """State a verdict in one sentence. `words` names an effect; `nearest`: other explanations tried."""
     if verdict == "none":
         near = "to within the noise" if (remainder["times_floor"] or 0.0) <= 1.0 else "as well as was asked for"
         return f"Nothing that matters is missing from the base model: it predicts these data {near}."

@@ -1,4 +1,4 @@
-"""A verdict as one screen of text."""
+"""A verdict as one screen of text, and the origin of the noise floor in words."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
-from lacuna.report.measured import floor_sentence
 from lacuna.report.sentence import next_in_words, number_in_words, own_form, share_in_words, verdict_sentence
 
 _WIDTH, _LINES = 100, 40
@@ -93,3 +92,29 @@ def _more(record: Mapping[str, Any], effects: Sequence[str]) -> Iterator[str]:
         yield f"These data would hardly show: {', '.join(hidden)}."
     if coming := next_in_words(record["next_experiment"]):
         yield f"Next: {coming}"
+
+
+def floor_sentence(diagnosis: Diagnosis) -> str:
+    """Say where the floor comes from and, for channels without repeats, what that implies."""
+    channels = diagnosis.search.floor.channels
+    repeats = sum(noise.repeats for noise in channels.values())
+    alone = sorted({channel for (_, channel), noise in channels.items() if not noise.repeats})
+    if not alone:
+        return f"The floor comes from the differences between {pairs_in_words(repeats)}."
+    time_s = diagnosis.base.structure.system.noise_time_s
+    told = {c: seconds for c in alone if (seconds := max(time_s(*key) for key in channels if key[1] == c))}
+    if len(told) == len(alone):
+        listed = ", ".join(f"{seconds:.3g} s of {channel}" for channel, seconds in told.items())
+        return (
+            f"Without repeats the floor is how much residuals change within the noise's correlation time ({listed});"
+            " whatever varies that fast counts as noise here, whatever is slower as structure."
+        )
+    return (
+        f"Without repeats the floor of {', '.join(alone)} is the fast noise of the residual: whatever varies slowly"
+        " from run to run counts as structure here, and only a repeat could show that it is not."
+    )
+
+
+def pairs_in_words(count: int) -> str:
+    """Say how many pairs of repeats there are."""
+    return "one pair of repeats" if count == 1 else f"{count} pairs of repeats"

@@ -56,12 +56,9 @@ def test_means_over_robots(capsys):
     assert "robots: 2" in capsys.readouterr().out
 
 
-def test_reliability_compares_what_was_predicted_with_what_walked():
+def test_reliability_compares_what_was_predicted_with_what_walked_and_is_drawn(tmp_path):
     found = loop.reliability([robot(naive=gait(23.0, (23.0, 1.0, 1.0), probability=0.6))])
     assert found == [(pytest.approx(0.6), pytest.approx(1 / 3), 3), (pytest.approx(0.97), 1.0, 12)]
-
-
-def test_the_reliability_plot_is_drawn(tmp_path):
     loop.plot([robot()], tmp_path / "reliability.png")
     assert (tmp_path / "reliability.png").stat().st_size > 5000
 

@@ -25,14 +25,10 @@ def test_two_campaigns_are_told_apart(tmp_path):
     assert not re.findall(r"\b\w+_\w+\b", said)
 
 
-def test_equal_campaigns_are_said_to_agree(tmp_path):
+def test_equal_campaigns_are_said_to_agree_and_the_fastest_gait_is_that_of_all_that_were_walked(tmp_path):
     runs = read_runs([sample.finished(tmp_path / "a"), sample.finished(tmp_path / "b")])
     assert "All found the same: hysteresis" in compare_page(runs).lead
     assert not [row for row in parameter_table(runs).rows if "≠" in row[0]]
-
-
-def test_the_fastest_gait_is_the_fastest_of_all_that_were_walked(tmp_path):
-    runs = read_runs([sample.finished(tmp_path / "a"), sample.finished(tmp_path / "b")])
     gaits = runs[1].summary["gaits"]
     gaits[1]["measured"] = 22.814
     assert f"({GAIT_NAMES[gaits[1]['gait']]}) walks 22.81 mm/s, in b" in compare_page(runs).lead

@@ -1,16 +1,21 @@
-"""A campaign's stages: run once, resumed, rerun alone, never half-written."""
+"""A campaign's stages: run once, resumed, rerun alone, never half-written; their progress fits any terminal."""
 
 import hashlib
+import io
 import json
 import os
+import re
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from bifa.campaign import stages
+from bifa.campaign.progress import StageProgress
 from bifa.campaign.stages import PROVENANCE, Stage, StageError, digest, run_stages
 from bifa.lock import LockedError, locked
+from bifa.screen import Console
 
 
 def copier(name, needs, makes, log, text="x", settings=None):
@@ -310,3 +315,19 @@ def test_two_campaigns_do_not_write_into_one_folder(tmp_path):
     assert log == []
     run_stages(tmp_path / "out", stages)
     assert log == ["a"]
+
+
+STAGE = Stage("measure", "characterise the robot on its bench", (), (), lambda inputs, outputs: None)
+
+
+@pytest.mark.parametrize("width", [60, 80, 120, 200])
+def test_what_the_stage_does_is_not_cut_off(width):
+    out = io.StringIO()
+    with closing(StageProgress(Console(file=out, width=width, force_terminal=True, color_system=None))) as progress:
+        progress.start(STAGE)
+        progress.update("static loading, small, 8 psi, 2 mm/s, repeat 1", 0.4)
+        progress.end(STAGE, ran=True)
+    seen = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", out.getvalue()).replace("\r", "\n")
+    assert "…" not in seen
+    assert "done" in seen
+    assert max(map(len, seen.splitlines())) <= width

@@ -1,6 +1,6 @@
 """Days in the lab with randomly drawn robots, and typical mistakes in their data."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,9 +25,10 @@ def drawn(folder: Path, seed: int, truth: str = "own", effect: str | None = None
     return read_dataset(out)
 
 
-def mistaken(day: Dataset, file: str, change: Change) -> Dataset:
-    """The day with one trial changed."""
-    return replace(day, trials=tuple(change(trial) if trial.file == file else trial for trial in day.trials))
+def mistaken(day: Dataset, files: str | Iterable[str], change: Change) -> Dataset:
+    """The day with the trials of these files changed."""
+    files = {files} if isinstance(files, str) else {*files}
+    return replace(day, trials=tuple(change(trial) if trial.file in files else trial for trial in day.trials))
 
 
 def said(day: Dataset) -> list[tuple[str, str | None]]:
@@ -37,6 +38,11 @@ def said(day: Dataset) -> list[tuple[str, str | None]]:
 
 def with_columns(trial: Trial, **columns: np.ndarray) -> Trial:
     return replace(trial, columns=trial.columns | columns)
+
+
+def rows(*part: int | None) -> Change:
+    """Keep only a slice of the rows."""
+    return lambda trial: with_columns(trial, **{name: values[slice(*part)] for name, values in trial.columns.items()})
 
 
 def turned(*names: str) -> Change:

@@ -45,17 +45,13 @@ def findings(trials):
     return [found for found in check_recordings(Dataset(None, "x", {}, tuple(trials))) if found.kind == "lag"]
 
 
-@pytest.mark.parametrize("late_s", [-0.02, -0.01, -0.004, 0.0, 0.0017, 0.01])
-def test_a_shift_is_measured_to_a_millisecond(session, late_s):
+@pytest.mark.parametrize(
+    ("late_s", "tracked"),
+    [*((s, lambda trial: trial) for s in (-0.02, -0.01, -0.004, 0.0, 0.0017, 0.01)), (-0.01, head_only)],
+)
+def test_a_shift_is_measured_to_a_millisecond_also_if_only_the_head_was_tracked(session, late_s, tracked):
     for trial in session:
-        lag = displacement_lag(late(trial, late_s))
-        assert lag.late_s == pytest.approx(late_s, abs=1.2e-3)
-
-
-def test_a_walk_of_which_only_the_head_was_tracked_tells_it_too(session):
-    for trial in session:
-        lag = displacement_lag(late(head_only(trial), -0.01))
-        assert lag.late_s == pytest.approx(-0.01, abs=1.2e-3)
+        assert displacement_lag(late(tracked(trial), late_s)).late_s == pytest.approx(late_s, abs=1.2e-3)
 
 
 @pytest.mark.parametrize("effect", ["hysteresis", "line_lag", "choked_flow", "sensor_position", "area_variation"])

@@ -17,10 +17,7 @@ def shown(tmp_path, day, monkeypatch):
     monkeypatch.setenv("COLUMNS", "400")
 
     def check(*files: str) -> tuple[int, str]:
-        wrong = day
-        for file in files:
-            wrong = mistaken(wrong, file, turned("force_N"))
-        folder = write_dataset(tmp_path / "day", wrong)
+        folder = write_dataset(tmp_path / "day", mistaken(day, files, turned("force_N")))
         result = CliRunner().invoke(app, ["check", str(folder), "--strict"])
         return result.exit_code, result.output
 
@@ -45,20 +42,17 @@ def test_the_same_in_many_files_is_said_once(shown):
 @pytest.mark.parametrize("command", ["fit", "diagnose"])
 def test_a_mistake_is_told_before_what_it_would_upset(tmp_path, day, monkeypatch, command):
     monkeypatch.setenv("COLUMNS", "400")
-    wrong, loadings = day, [trial.file for trial in day.of("static_loading", "large")]
-    for file in loadings:
-        wrong = mistaken(wrong, file, turned("force_N"))
-    folder, model = write_dataset(tmp_path / "day", wrong), tmp_path / "model.toml"
+    loadings, model = [trial.file for trial in day.of("static_loading", "large")], tmp_path / "model.toml"
+    folder = write_dataset(tmp_path / "day", mistaken(day, loadings, turned("force_N")))
     result = CliRunner().invoke(app, [command, str(folder), "--out", str(model)])
     assert f"warning [sign] {len(loadings)} trials, force_N: falls by" in result.output
     assert "static loadings of the large actuator" in str(result.exception)
     assert not model.exists()
 
 
-def test_a_sound_day_is_said_to_be_one(shown):
+def test_a_sound_day_passes_the_strict_check(shown):
     status, output = shown()
-    assert status == 0
-    assert "Nothing looks wrong." in output
+    assert (status, "Nothing looks wrong." in output) == (0, True)
 
 
 def clipped(trial: int, psi: float) -> Finding:

@@ -9,7 +9,7 @@ from bifa.check.plausibility import check_plausibility
 from bifa.check.repeats import check_copies
 from bifa.data import Dataset, Trial
 
-from .days import mistaken, said, with_columns
+from .days import mistaken, rows, said, with_columns
 
 ENDS = ("displacement_head_mm", "displacement_tail_mm")
 
@@ -45,14 +45,9 @@ def test_another_scale_of_the_camera_is_named_with_how_much_it_makes(any_day):
     assert "mm (RMS)" in str(found)
 
 
-def late(samples: int):
-    """Start the recording `samples` samples later."""
-    return lambda trial: replace(trial, columns={name: values[samples:] for name, values in trial.columns.items()})
-
-
 def test_when_a_recording_was_started_makes_no_difference(day):
-    changed = mistaken(day, "step_large_8.5psi_2.csv", late(30))
-    assert said(mistaken(changed, "static_large_0psi_2mm_s_1.csv", late(90))) == []
+    later = mistaken(day, "step_large_8.5psi_2.csv", rows(30, None))
+    assert said(mistaken(later, "static_large_0psi_2mm_s_1.csv", rows(90, None))) == []
 
 
 def test_of_two_repeats_nobody_knows_which_is_the_odd_one(day):

@@ -12,7 +12,7 @@ from bifa.data import EXPERIMENTS, Dataset, write_dataset
 from bifa.files import TargetError
 from harness.data_sets import make_dataset, make_trial
 
-from .days import mistaken, with_columns
+from .days import mistaken, rows, with_columns
 
 
 def sound() -> Dataset:
@@ -124,10 +124,7 @@ def test_repeats_are_counted_whatever_their_numbers_are(numbers, said):
 
 
 def test_a_record_that_was_cut_off_is_shorter_than_the_other_repeats():
-    def cut(trial):
-        return replace(trial, columns={name: values[:25] for name, values in trial.columns.items()})
-
-    (found,) = check_recordings(mistaken(sound(), "locomotion_2.csv", cut))
+    (found,) = check_recordings(mistaken(sound(), "locomotion_2.csv", rows(25)))
     assert str(found) == (
         "locomotion_2.csv, line 26, time_s: lasts 0.24 s, the others 0.39 s: was it cut off? Record it again"
     )

@@ -21,38 +21,31 @@ def test_a_walk_that_is_mirrored(any_day, change):
         assert said(mistaken(any_day, trial.file, change)) == [("mirrored", trial.file)]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("chambers", [("body",), ("tail",), CHAMBERS], ids=str)
-def test_pressures_of_the_wrong_sign(any_day, chambers):
-    columns = [f"pressure_{chamber}_psi" for chamber in chambers]
-    for trial in any_day.of("locomotion"):
-        (found,) = check_plausibility(mistaken(any_day, trial.file, turned(*columns)))
-        assert (found.kind, found.file, found.column) == ("sign", trial.file, ", ".join(columns))
-
-
-@pytest.mark.parametrize(("experiment", "where"), [("step_response", ""), ("locomotion", " in all three columns")])
-def test_commands_written_the_other_way_round(any_day, experiment, where):
-    for trial in any_day.of(experiment):
-        (found,) = check_plausibility(mistaken(any_day, trial.file, inverted))
-        first = next(name for name in trial.columns if name.startswith("command"))
-        assert (found.kind, found.file, found.column) == ("sign", trial.file, first)
-        assert f"1 is positive pressure, 0 vacuum; exchange them{where}" in str(found)
+OTHER_WAY = "1 is positive pressure, 0 vacuum; exchange them"
+PRESSURES = [f"pressure_{chamber}_psi" for chamber in CHAMBERS]
 
 
 @pytest.mark.parametrize(
-    ("experiment", "column"),
+    ("experiment", "change", "column", "words"),
     [
-        ("static_loading", "force_N"),
-        ("static_loading", "displacement_mm"),
-        ("anchor_pull", "force_N"),
-        ("step_response", "displacement_mm"),
-        ("step_response", "pressure_psi"),
+        ("static_loading", turned("force_N"), "force_N", ""),
+        ("static_loading", turned("displacement_mm"), "displacement_mm", ""),
+        ("anchor_pull", turned("force_N"), "force_N", ""),
+        ("step_response", turned("displacement_mm"), "displacement_mm", ""),
+        ("step_response", turned("pressure_psi"), "pressure_psi", ""),
+        ("step_response", inverted, "command", OTHER_WAY),
+        ("locomotion", inverted, "command_body", f"{OTHER_WAY} in all three columns"),
+        *(
+            pytest.param("locomotion", turned(*names), ", ".join(names), "", marks=pytest.mark.slow)
+            for names in (["pressure_body_psi"], ["pressure_tail_psi"], PRESSURES)
+        ),
     ],
 )
-def test_a_column_of_the_wrong_sign(any_day, experiment, column):
+def test_a_wrong_sign_is_found_in_its_column(any_day, experiment, change, column, words):
     for trial in any_day.of(experiment):
-        (found,) = check_plausibility(mistaken(any_day, trial.file, turned(column)))
+        (found,) = check_plausibility(mistaken(any_day, trial.file, change))
         assert (found.kind, found.file, found.column) == ("sign", trial.file, column)
+        assert words in str(found)
 
 
 def test_of_a_wrong_sign_the_number_the_convention_and_what_to_do_are_said(day):
@@ -109,10 +102,7 @@ def test_the_walk_whose_gait_it_is_is_named(day):
 )
 def test_a_likely_cause_is_named(day, gait, cause):
     walks = [f"walk_leisurely_{repeat}.csv" for repeat in (1, 2, 3)]
-    wrong = day
-    for file in walks:
-        wrong = mistaken(wrong, file, told(**gait))
-    found = check_plausibility(wrong)
+    found = check_plausibility(mistaken(day, walks, told(**gait)))
     assert [finding.file for finding in found] == walks
     assert all(cause in str(finding) for finding in found)
 

@@ -9,7 +9,7 @@ from bifa.check.plausibility import check_plausibility
 from bifa.cli import app
 from bifa.data import write_dataset
 
-from .days import exchanged, mistaken, with_columns
+from .days import exchanged, mistaken, rows, with_columns
 
 LENGTHS = {"cm": 10.0, "in": 25.4, "m": 1000.0}
 FORCES = {"lbf": 4.448222, "kN": 1000.0, "kgf": 9.80665}
@@ -35,14 +35,10 @@ def test_a_length_or_a_force_in_another_unit_is_named(any_day, column, unit):
         assert f"is it in {unit}?" in said or unit in ("lbf", "kgf")
 
 
-@pytest.mark.parametrize("rows", [2, 5])
-def test_a_walk_of_a_few_rows_is_no_traceback(day, rows):
+@pytest.mark.parametrize("count", [2, 5])
+def test_a_walk_of_a_few_rows_is_no_traceback(day, count):
     walk = day.of("locomotion")[0]
-
-    def cut(trial):
-        return with_columns(trial, **{name: values[:rows] for name, values in trial.columns.items()})
-
-    assert not [file for file, _, _ in units_found(mistaken(day, walk.file, cut)) if file != walk.file]
+    assert not [file for file, _, _ in units_found(mistaken(day, walk.file, rows(count))) if file != walk.file]
 
 
 def test_a_pull_in_kilonewtons_is_named(any_day):
@@ -67,8 +63,7 @@ def test_a_cross_head_that_was_set_otherwise_is_found(any_day, rate_mm_s):
 
 
 def test_a_fit_says_so_before_it_fails(day, tmp_path):
-    kilo = in_unit("force_N", 1000.0)
-    trials = tuple(kilo(trial) if "force_N" in trial.columns else trial for trial in day.trials)
-    write_dataset(tmp_path / "day", replace(day, path=None, trials=trials))
+    files = [trial.file for trial in day.trials if "force_N" in trial.columns]
+    write_dataset(tmp_path / "day", mistaken(day, files, in_unit("force_N", 1000.0)))
     said = CliRunner().invoke(app, ["fit", str(tmp_path / "day"), "--out", str(tmp_path / "model.toml")]).output
     assert "is it in kN?" in " ".join(said.split())

@@ -1,7 +1,10 @@
-"""Properties of every command: help, version, option names, early checks of output paths, completion, Ctrl-C."""
+"""Properties of every command: help that fits any terminal, version, option names, early checks of output paths,
+completion, Ctrl-C."""
 
+import inspect
 import json
 import os
+import re
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -10,6 +13,7 @@ from unittest.mock import Mock
 
 import pytest
 import typer
+import typer.main
 from typer.testing import CliRunner
 
 import bifa
@@ -19,7 +23,8 @@ from bifa.cli.optimize import pictures_beside
 from bifa.files import TargetError
 from bifa.robot import BASELINE, save_gait
 
-COMMANDS = sorted(typer.main.get_command(app).commands)
+BY_NAME = typer.main.get_command(app).commands
+COMMANDS = sorted(BY_NAME)
 
 
 def invoke(*arguments, columns=160, **options):
@@ -35,7 +40,7 @@ def test_every_command_has_both_helps_and_the_same_names_for_the_same_things(com
     short, long = invoke(command, "-h"), invoke(command, "--help")
     assert short.exit_code == long.exit_code == 0
     assert short.output == long.output
-    names = {name for option in typer.main.get_command(app).commands[command].params for name in option.opts}
+    names = {name for option in BY_NAME[command].params for name in option.opts}
     assert not names & {"--plot", "--plots", "--figures", "--picture", "--folder", "--csv", "--output"}
 
 
@@ -135,16 +140,15 @@ def tried(commands, folder) -> list[tuple[int, set[str]]]:
     return [(status, set(packages)) for status, packages in json.loads(ended.stdout)]
 
 
-def test_an_error_of_usage_is_told_before_anything_is_computed_with(tmp_path):
-    for arguments, (status, packages) in zip(USAGE, tried(USAGE, tmp_path), strict=True):
-        assert status == 2, arguments
-        assert packages & (SECONDS | {"numpy"}) == set(), arguments
-
-
-def test_what_only_lists_imports_nothing_that_takes_seconds(tmp_path):
-    for arguments, (status, packages) in zip(LISTING, tried(LISTING, tmp_path), strict=True):
-        assert status in (0, 1), arguments
-        assert packages & SECONDS == set(), arguments
+@pytest.mark.parametrize(
+    ("commands", "statuses", "costly"),
+    [(USAGE, {2}, SECONDS | {"numpy"}), (LISTING, {0, 1}, SECONDS)],
+    ids=["an error of usage is told", "what only lists is listed"],
+)
+def test_before_anything_is_imported_that_takes_seconds(tmp_path, commands, statuses, costly):
+    for arguments, (status, packages) in zip(commands, tried(commands, tmp_path), strict=True):
+        assert status in statuses, arguments
+        assert packages & costly == set(), arguments
 
 
 def test_ctrl_c_says_what_became_of_the_work(monkeypatch):
@@ -323,3 +327,67 @@ def test_upload_and_console_on_the_virtual_robot(tmp_path):
         f"[period_s 5.7 {period}", "ok", "[period_s 5.700 -> 4.000 s", "ok", f"[period_s 4 {period} * power-up 5.7 s",
         "ok"]  # fmt: skip
     assert invoke("console", "--port", "virtual", input="fly\n").exit_code == 1
+
+
+SHOW = """
+import contextlib, io, json
+from bifa.cli import app
+helps = {}
+for name in [[], *([command.callback.__name__] for command in app.registered_commands)]:
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        app([*name, "--help"], prog_name="bifa", standalone_mode=False)
+    helps[" ".join(name)] = said.getvalue()
+print(json.dumps(helps))
+"""
+MARGINS = 4  # columns, both sides of a line together
+
+
+@pytest.fixture(scope="module", params=[60, 80, 120, 200])
+def shown(request):
+    """A terminal's width, and the help of bifa (key "") and of every command at that width."""
+    environment = os.environ | {"COLUMNS": str(request.param)}
+    done = subprocess.run([sys.executable, "-c", SHOW], capture_output=True, text=True, env=environment, check=True)
+    return request.param, json.loads(done.stdout)
+
+
+def squeezed(text: str) -> str:
+    return " ".join(text.split())
+
+
+def paragraphs(command: typer.core.TyperCommand) -> list[str]:
+    return [squeezed(paragraph) for paragraph in inspect.getdoc(command.callback).split("\n\n")]
+
+
+def test_nothing_is_wider_than_the_terminal_or_cut_off(shown):
+    width, helps = shown
+    assert len(helps) == 1 + len(BY_NAME)
+    for said in helps.values():
+        assert max(map(len, said.splitlines())) <= width
+        assert "…" not in said
+    for name, command in BY_NAME.items():
+        for option in (option for parameter in command.params for option in parameter.opts if option[:2] == "--"):
+            assert re.search(rf"{option}\b(?!-)", helps[name])
+        sentence = paragraphs(command)[0].split(". ")[0].rstrip(".")
+        assert f"{sentence}." in squeezed(helps[""].replace("│", ""))
+
+
+def test_paragraphs_fill_the_lines(shown):
+    width, helps = shown
+    for name, command in BY_NAME.items():
+        lines = [line.strip() for line in helps[name].splitlines()]
+        for paragraph in paragraphs(command):
+            begin = next(i for i, line in enumerate(lines) if line and paragraph.startswith(line))
+            end = begin + lines[begin:].index("")
+            assert " ".join(lines[begin:end]) == paragraph
+            for line, following in zip(lines[begin:end], lines[begin + 1 : end], strict=False):
+                assert len(line) + 1 + len(following.split()[0]) > width - MARGINS
+
+
+def test_every_example_has_a_line_of_its_own(shown):
+    _, helps = shown
+    for name, command in BY_NAME.items():
+        examples = [squeezed(example) for example in command.epilog.split("\n\n")]
+        assert examples[0] == "Examples:"
+        assert all(f"bifa {name}" in example or name == "rig" for example in examples[1:])
+        end = re.sub(r" *\n", "\n", helps[name].partition("Examples:")[2])
+        assert [squeezed(example) for example in end.strip().split("\n\n")] == examples[1:]

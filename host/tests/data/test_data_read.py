@@ -222,39 +222,34 @@ def test_malformed_table_is_refused_with_its_place(folder, damage, column, words
         assert "line 1" in str(error)
 
 
+NAMED = b'format = 1\nname = "x"\n'
+
+
 @pytest.mark.parametrize(
-    ("key", "said"),
-    [("known", "a table, not a list"), ("provenance", "a table, not a list"), ("trial", "at least one")],
+    ("table", "line", "said"),
+    [
+        (NAMED + b"known = []\n", 3, "line 3, known: must be .*a table, not a list"),
+        (NAMED + b"provenance = []\n", 3, "line 3, provenance: must be .*a table, not a list"),
+        (NAMED + b"trial = []\n", 3, "line 3, trial: must be .*at least one"),
+        (NAMED + b"trial = [{ file = 1 }]\n", None, "trial 1, file: must be a string"),
+        (b'format = 1\nname = "\xff"\n', 2, "line 2: byte 0xff is not UTF-8"),
+    ],
 )
-def test_a_list_in_place_of_a_table_and_no_trials(tmp_path, key, said):
-    (tmp_path / "dataset.toml").write_text(f'format = 1\nname = "x"\n{key} = []\n')
-    with pytest.raises(DatasetError, match=f"line 3, {key}: must be .*{said}"):
+def test_a_table_is_refused_by_its_line_where_one_is_certain(tmp_path, table, line, said):
+    (tmp_path / "dataset.toml").write_bytes(table)
+    with pytest.raises(DatasetError, match=said) as caught:
         read_dataset(tmp_path)
+    assert caught.value.line == line
 
 
-def test_inline_trials_are_named_by_number_where_no_line_is_certain(tmp_path):
-    (tmp_path / "dataset.toml").write_text('format = 1\nname = "x"\ntrial = [{ file = 1 }]\n')
-    with pytest.raises(DatasetError, match="trial 1, file: must be a string") as caught:
-        read_dataset(tmp_path)
-    assert caught.value.line is None
-
-
-def test_table_in_the_wrong_encoding(folder):
-    (folder / "dataset.toml").write_bytes(b'format = 1\nname = "\xff"\n')
-    with pytest.raises(DatasetError, match="line 2: byte 0xff is not UTF-8"):
-        read_dataset(folder)
-
-
-def test_no_table_and_no_folder(tmp_path):
-    with pytest.raises(DatasetError, match=r"no dataset\.toml: .*docs/data-format\.md.*`bifa experiment`"):
+def test_what_is_no_data_set_is_told_what_would_be(folder, tmp_path):
+    with pytest.raises(DatasetError, match=f"is not a data set, but contains bench: use {folder}"):
         read_dataset(tmp_path)
     with pytest.raises(DatasetError, match="is not a folder"):
         read_dataset(tmp_path / "nowhere")
-
-
-def test_a_folder_above_a_data_set_is_told_its_name(folder):
-    with pytest.raises(DatasetError, match=f"is not a data set, but contains bench: use {folder}"):
-        read_dataset(folder.parent)
+    (folder / "dataset.toml").unlink()
+    with pytest.raises(DatasetError, match=r"no dataset\.toml: .*docs/data-format\.md.*`bifa experiment`"):
+        read_dataset(folder)
 
 
 def test_a_table_that_begins_with_a_mark_is_read(folder):

@@ -1,8 +1,9 @@
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
-from harness.chip import VALVES, Chip
+from bifa import link
+from harness.chip import VALVES, Chip, Line, connected
 
 
 class Bench(Chip):
@@ -38,18 +39,16 @@ class Bench(Chip):
 
 
 @pytest.fixture
-def new_bench() -> Iterator[Callable[..., Bench]]:
-    benches = []
-
-    def make(eeprom: bytes | None = None) -> Bench:
-        benches.append(Bench(eeprom))
-        return benches[-1]
-
-    yield make
-    for bench in benches:
-        bench.close()
+def new_bench(closes) -> Callable[..., Bench]:
+    return lambda eeprom=None: closes(Bench(eeprom))
 
 
 @pytest.fixture
 def bench(new_bench) -> Bench:
     return new_bench()
+
+
+@pytest.fixture
+def uno(bench) -> link.Uno:
+    """The host's end of the link to the bench, connected."""
+    return connected(Line(bench.uno))

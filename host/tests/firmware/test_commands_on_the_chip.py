@@ -5,7 +5,7 @@ import pytest
 from bifa.link import frames
 from bifa.link.errors import LinkError, RefusedError
 from bifa.link.table import COMMANDS, CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, TABLE_HASH
-from harness.chip import connected, encoded
+from harness.chip import encoded
 
 pytestmark = pytest.mark.uno
 
@@ -23,8 +23,7 @@ SIXTEEN = [(100 * entry, 0, 2) for entry in range(16)]
     [(TWO, (500, 0, 0)), (TWO, (2000, 3, 2)), (TWO, (2000, 0, 3)), (SIXTEEN, (1600, 0, 0))],
     ids=["goes backwards", "no chamber", "no state", "seventeenth"],
 )
-def test_entry_that_is_wrong_spoils_a_schedule_until_it_is_cleared(bench, entries, wrong):
-    uno = connected(bench.uno)
+def test_entry_that_is_wrong_spoils_a_schedule_until_it_is_cleared(bench, uno, entries, wrong):
     uno.session.call("schedule_clear")
     for entry in entries:
         add(uno, *entry)
@@ -43,8 +42,7 @@ def test_entry_that_is_wrong_spoils_a_schedule_until_it_is_cleared(bench, entrie
     assert bench.valves_on
 
 
-def test_walk_is_refused_while_timed_holds_wait_and_none_of_them_is_lost(bench):
-    uno = connected(bench.uno)
+def test_walk_is_refused_while_timed_holds_wait_and_none_of_them_is_lost(bench, uno):
     uno.schedule([(0.5, "body", "positive"), (1.0, "body", "off")])
     assert "error not in this state" in bench.say("run")
     with pytest.raises(RefusedError, match="not in this state"):
@@ -55,8 +53,7 @@ def test_walk_is_refused_while_timed_holds_wait_and_none_of_them_is_lost(bench):
     assert not bench.valves_on
 
 
-def test_clearing_timed_holds_that_run_vents(bench):
-    uno = connected(bench.uno)
+def test_clearing_timed_holds_that_run_vents(bench, uno):
     uno.schedule([(0, "body", "positive"), (5.0, "body", "off")])
     bench.wait(0.1)
     assert bench.valves_on == [4]
@@ -64,8 +61,7 @@ def test_clearing_timed_holds_that_run_vents(bench):
     assert not bench.valves_on
 
 
-def test_new_session_ends_the_timed_holds_of_the_one_before(bench):
-    uno = connected(bench.uno)
+def test_new_session_ends_the_timed_holds_of_the_one_before(bench, uno):
     first = bench.uno.event_count
     uno.schedule([(0.5, "body", "positive"), (1.0, "body", "off")])
     uno.connect()
@@ -73,8 +69,7 @@ def test_new_session_ends_the_timed_holds_of_the_one_before(bench):
     assert bench.edges(first, [4]) == []
 
 
-def test_holds_that_wait_for_longer_than_the_host_may_be_silent_open_no_valve_even_for_a_moment(bench):
-    uno = connected(bench.uno)
+def test_holds_that_wait_for_longer_than_the_host_may_be_silent_open_no_valve_even_for_a_moment(bench, uno):
     uno.set("host_timeout_s", 0.5)
     first = bench.uno.event_count
     uno.schedule([(1.0, "body", "positive"), (2.0, "body", "off")])
@@ -94,8 +89,7 @@ def test_stop_that_is_typed_behind_a_torn_frame_is_carried_out(bench):
     assert not bench.valves_on
 
 
-def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench):
-    uno = connected(bench.uno)
+def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench, uno):
     status, clear = encoded(uno, "status", "clear")
     bench.say("help", 0.001)  # while this prints, the others wait
     bench.uno.send(status + b"!" + clear)
@@ -103,8 +97,7 @@ def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench
     assert "state idle" in bench.say("status", 0.5)
 
 
-def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(bench):
-    uno = connected(bench.uno)
+def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(bench, uno):
     uno.upload({"period_s": 20.0, "host_timeout_s": 60.0})  # no host talks to it for a whole cycle
     uno.run()
     bench.wait(1.0)
@@ -133,14 +126,12 @@ def test_answers_have_units_ranges_and_marks(bench):
     assert bench.say("show period_s") == "[period_s 2.72 s (0.5 to 60 s, default 5.7 s)\r\nok\r\n"
 
 
-def test_version_and_stream_say_what_they_are(bench):
+def test_version_and_stream_say_what_they_are_and_help_is_whole_with_line_ends_for_bare_terminals(bench):
     assert f"protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}, started by " in bench.say("version")
     header = "[>sequence,time_us,state,psi body,head,tail,command body,head,tail,phase_deg body,head,tail\r\n"
     for _ in range(2):  # again, while it streams
         assert header in bench.say("stream on", 0.3)
-
-
-def test_help_is_printed_whole_and_with_line_ends_for_bare_terminals(bench):
+    bench.say("stream off", 0.3)
     said = bench.say("help", 0.5)
     for _, usage, text in CONSOLE_COMMANDS:
         assert f"[{usage}  {text}\r\n" in said
@@ -182,8 +173,7 @@ def test_zero_is_refused_with_its_reason_and_shows_the_old_and_the_new_offset(be
     assert float(new[5]) == pytest.approx(-0.075 + 0.02, abs=0.04)
 
 
-def test_set_that_waited_when_the_walk_ended_is_that_of_the_next_walk(bench):
-    uno = connected(bench.uno)
+def test_set_that_waited_when_the_walk_ended_is_that_of_the_next_walk(bench, uno):
     uno.upload({"period_s": 20.0})
     uno.run()
     bench.wait(1.0)

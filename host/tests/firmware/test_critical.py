@@ -49,10 +49,7 @@ def instructions(tmp_path, function: str) -> list[str]:
     return [line.split("\t", 1)[1].replace("\t", " ") for line in body.splitlines() if line.startswith("\t")]
 
 
-def test_store_in_the_guard_stays_there_though_another_follows_it(tmp_path):
+def test_store_in_the_guard_stays_there_and_a_value_read_before_it_is_read_anew_in_it(tmp_path):
     code = [line for line in instructions(tmp_path, "twice") if re.match(r"cli|out __SREG__|sts shared", line)]
     assert [line.split(",")[0].split()[0] for line in code] == ["cli", "sts", "out", "sts"]
-
-
-def test_value_read_before_the_guard_is_read_anew_in_it(tmp_path):
     assert sum(line.startswith("lds") for line in instructions(tmp_path, "reads")) == 2

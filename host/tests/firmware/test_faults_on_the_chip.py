@@ -6,7 +6,7 @@ import struct
 import pytest
 
 from bifa.link.table import PARAMETERS
-from harness.chip import connected, encoded
+from harness.chip import encoded
 from virtual_robot.uno import CLOCK_HZ
 
 pytestmark = pytest.mark.uno
@@ -160,8 +160,7 @@ def test_what_waits_when_a_fault_comes_does_not_undo_it(bench, first, lose, name
     assert bench.say("run").rstrip().endswith("ok")
 
 
-def test_clear_frames_that_wait_when_a_fault_comes_do_not_undo_it(bench):
-    uno = connected(bench.uno)
+def test_clear_frames_that_wait_when_a_fault_comes_do_not_undo_it(bench, uno):
     bench.uno.send(b"help\n" * 4 + b"".join(encoded(uno, "clear", "run")))
     lose_a_sensor(bench)
     bench.wait(1.0)

@@ -28,25 +28,20 @@ LISTING = """
 """
 
 
-def test_frames_are_pushes_locals_and_what_the_common_prologue_saves():
+def test_frames_are_pushes_locals_and_what_the_common_prologue_saves_and_the_deepest_chain_adds_return_addresses():
     found = stack_bound.functions(LISTING)
     assert found["leaf"].frame == 0
     assert found["pushes"].frame == 2 + 12
     assert found["common"].frame == (18 - 14) + 0x120 + 2
-
-
-def test_deepest_is_the_deepest_chain_with_its_return_addresses():
-    found = stack_bound.functions(LISTING)
     depth, chain = stack_bound.deepest(found, "common")
     assert depth == found["common"].frame + 2 + 14 + 2
     assert [link.split()[0] for link in chain] == ["common", "pushes", "leaf"]
 
 
 def test_recursion_and_a_pointer_of_which_nothing_is_known_are_errors():
+    recursive = stack_bound.functions(LISTING.replace("<leaf>", "<pushes>").replace("0x100", "0x110"))
     with pytest.raises(ValueError, match="calls itself"):
-        stack_bound.deepest(
-            stack_bound.functions(LISTING.replace("<leaf>", "<pushes>").replace("0x100", "0x110")), "common"
-        )
+        stack_bound.deepest(recursive, "common")
     found = stack_bound.functions(LISTING.replace("ret\n\n00000110", "icall\n\n00000110"))
     with pytest.raises(ValueError, match="leaf calls through a pointer"):
         stack_bound.with_pointers(found)

@@ -5,7 +5,7 @@ from itertools import product
 import pytest
 
 from bifa.link import frames
-from harness.chip import connected, encoded
+from harness.chip import encoded
 from virtual_robot.uno import CLOCK_HZ
 
 pytestmark = pytest.mark.uno
@@ -134,14 +134,6 @@ def test_emergency_stop_pressed_at_power_up(bench):
     assert "state stopped" in bench.say("status", 0.3)
 
 
-def stop_byte(bench):
-    bench.uno.send(b"!")
-
-
-def stop_frame(bench):
-    bench.uno.send(frames.STOP_FRAME)
-
-
 def tap(bench):
     """Press the emergency stop briefly."""
     bench.uno.press_emergency_stop()
@@ -149,7 +141,10 @@ def tap(bench):
     bench.uno.press_emergency_stop(False)
 
 
-@pytest.mark.parametrize("stop", [stop_byte, stop_frame, tap], ids=name_of)
+STOPS = [lambda bench: bench.uno.send(b"!"), lambda bench: bench.uno.send(frames.STOP_FRAME), tap]
+
+
+@pytest.mark.parametrize("stop", STOPS, ids=["byte", "frame", "tap"])
 @pytest.mark.parametrize("first", [b"save zz\n", b"help\n", b""], ids=["saving", "printing", "idle"])
 def test_what_waits_when_a_stop_comes_does_not_undo_it(bench, first, stop):
     bench.uno.send(b"!")
@@ -164,8 +159,7 @@ def test_what_waits_when_a_stop_comes_does_not_undo_it(bench, first, stop):
     assert bench.say("run").rstrip().endswith("ok")
 
 
-def test_clear_frames_that_wait_when_a_stop_comes_do_not_undo_it(bench):
-    uno = connected(bench.uno)
+def test_clear_frames_that_wait_when_a_stop_comes_do_not_undo_it(bench, uno):
     uno.stop()
     bench.uno.send(b"help\n" + b"".join(encoded(uno, "clear", "run")) + frames.STOP)
     bench.wait(1.0)

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from bifa.cli import app, optimize
 from bifa.errors import BifaError
 from bifa.gait import Settings, library, objectives, search
+from bifa.gait.library import LibraryError
 from bifa.gait.methods import METHODS
 from bifa.robot import Covariance, load_gait, nominal, save_model
 from bifa.simulate import gait_rows
@@ -103,4 +104,5 @@ def test_another_robots_gaits_do_not_replace_those_of_the_package(tmp_path):
 @pytest.mark.parametrize("make", [["--make"], []])
 def test_gaits_refuses_an_unknown_scenario(tmp_path, make):
     result = invoke("gaits", *make, "--only", "moon", "--out", tmp_path)
-    assert "the library has fast" in str(result.exception)
+    assert isinstance(result.exception, LibraryError)
+    assert "'moon'; the library has fast, robust, obstacle" in str(result.exception)

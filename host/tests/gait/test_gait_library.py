@@ -5,7 +5,6 @@ import pytest
 from scipy.stats import binom
 
 from bifa.gait import library, spread_of
-from bifa.gait.library import LibraryError
 from bifa.gait.library.scenarios import load_scenario
 from bifa.gait.objectives import distribution
 from bifa.robot import nominal
@@ -40,8 +39,3 @@ def test_the_obstacle_gait_brings_head_and_tail_through():
     outcome = passing(nominal(), library.load("obstacle").gait, tunnel(), Supports())
     assert outcome.through
     assert outcome.extension.enough
-
-
-def test_an_unknown_scenario_names_the_known_ones():
-    with pytest.raises(LibraryError, match="'moon'; the library has fast, robust, obstacle"):
-        library.load("moon")

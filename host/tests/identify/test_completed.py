@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.data import Dataset
 from bifa.identify.completed import completed_model, labeled
 from bifa.identify.start import prepare
 from bifa.robot import load_model, save_model
@@ -19,8 +18,7 @@ from lacuna.estimation.structure import Structure
 def system():
     lab = IndependentLab().with_seed(3)
     trials = [lab.static(which, p, 4.0, repeat=n) for which in ("large", "small") for p in (0.0, 8.0) for n in (1, 2)]
-    trials = tuple(replace(t, file=f"{i}.csv") for i, t in enumerate(trials))
-    return prepare(Dataset(path=None, name="monday", known={"head_mass_kg": 0.2}, trials=trials))
+    return prepare(replace(lab.day("monday", trials), known={"head_mass_kg": 0.2}))
 
 
 def test_the_knots_of_a_learnt_curve_are_in_the_covariance(system, tmp_path):
@@ -34,7 +32,7 @@ def test_the_knots_of_a_learnt_curve_are_in_the_covariance(system, tmp_path):
     np.testing.assert_allclose(load_model(tmp_path / "m.toml").covariance.matrix, model.covariance.matrix, rtol=1e-12)
 
 
-def test_a_fitted_model_says_where_each_value_comes_from(system):
+def test_a_fitted_model_says_where_each_value_comes_from_and_a_completed_one_what_was_added(system):
     model = labeled(system.model, system, "bifa fit", "2026-11-25")
     source = {name: parameter.source for name, parameter in model.parameters.items()}
     assert source["body_area_N_psi"] == "fitted to monday"
@@ -42,9 +40,6 @@ def test_a_fitted_model_says_where_each_value_comes_from(system):
     assert source["mu_k"].startswith("found to reproduce the paper")  # neither measured nor fitted
     assert model.name == "monday"
     assert model.provenance == "bifa fit on 2026-11-25: fitted to 8 trials of monday"
-
-
-def test_a_completed_model_is_named_for_what_was_added(system):
     model = labeled(system.model.with_effects({"choked_flow": {}}), system, "bifa diagnose")
     assert model.name == "monday with choked flow"
     assert model.provenance == "bifa diagnose: fitted to 8 trials of monday, completed by choked flow"

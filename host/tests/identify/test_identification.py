@@ -10,7 +10,6 @@ import pytest
 from rich.console import Console
 from scipy.stats import binom
 
-from bifa.data import Dataset
 from bifa.identify.identification import Identification, identify
 from bifa.problem.unmeasured import PRIOR_SD
 from bifa.report.fit import draw_curves, errors_table, fit_page, parameters_and_remarks, remarks
@@ -23,27 +22,9 @@ from tests.report.sample import text_of
 pytestmark = pytest.mark.slow
 
 
-def truth_of(lab: IndependentLab) -> dict[str, float]:
-    return {
-        "body_damping_Ns_m": lab.large.damping,
-        "body_area_N_psi": lab.large.area,
-        "body_alpha_n_per_s": lab.large.fast,
-        "body_alpha_s_per_s": lab.large.slow,
-        "small_damping_Ns_m": lab.small.damping,
-        "small_area_N_psi": lab.small.area,
-        "small_alpha_n_per_s": lab.small.fast,
-        "small_alpha_s_per_s": lab.small.slow,
-        "wall_offset_m": lab.wall_offset,
-        "mu_s": lab.mu_s,
-        "mu_k": lab.mu_k,
-    }
-
-
 def covered(found: Identification, lab: IndependentLab) -> dict[str, bool]:
     """Whether each parameter's interval contains the truth."""
-    return {
-        name: found.intervals[name].lower <= at <= found.intervals[name].upper for name, at in truth_of(lab).items()
-    }
+    return {name: found.intervals[name].lower <= at <= found.intervals[name].upper for name, at in lab.truth.items()}
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +40,7 @@ def found(lab):
 def test_the_parameters_of_an_independent_robot_come_back(found, lab):
     # The peak of a pull is known to a sample: 2 N of 34 N at 20 mm/s through a load cell of 5 kN/m.
     tolerance = {"mu_s": 0.06}
-    for name, truth in truth_of(lab).items():
+    for name, truth in lab.truth.items():
         assert found.model[name] == pytest.approx(truth, rel=tolerance.get(name, 0.02)), name
 
 
@@ -140,12 +121,8 @@ def test_a_model_that_does_not_fit_says_so(found):
 
 @pytest.fixture(scope="module")
 def static_only(lab):
-    trials = tuple(
-        replace(lab.static("large", p, rate_mm_s=4.0, repeat=r), file=f"{p:g}_{r}.csv")
-        for p in (0.0, 8.0)
-        for r in (1, 2)
-    )
-    return Dataset(path=None, name="static only", known={}, trials=trials)
+    trials = [lab.static("large", p, rate_mm_s=4.0, repeat=r) for p in (0.0, 8.0) for r in (1, 2)]
+    return replace(lab.day("static only", trials), known={})
 
 
 def test_repeats_that_differ_and_a_doubtful_known_value_do_not_pass_in_silence(found, static_only):

@@ -22,8 +22,7 @@ from harness.independent_lab import IndependentLab
 
 def bench(lab, actuator, pressures=(0.0, 4.0, 8.0), repeats=3) -> Dataset:
     trials = [lab.static(actuator, p, repeat=r) for p in pressures for r in range(1, repeats + 1)]
-    trials = tuple(replace(trial, file=f"{i}.csv") for i, trial in enumerate(trials))
-    return Dataset(path=None, name="static", known={}, trials=trials)
+    return replace(lab.day("static", trials), known={})
 
 
 @pytest.mark.parametrize("actuator", ["large", "small"])

@@ -154,6 +154,7 @@ def declared(**told):
     return lacuna.System(**{"simulate": heater.simulate, "parameters": heater.PARAMETERS, **told})
 
 
+NOT_IN_THETA = ("correction", "a.b", "gain_K_W", "items")
 REFUSED_DECLARATIONS = {
     "effect dead_band is listed under the key curve": {"effects": {"curve": heater.DEAD}},
     "parameter gain_K_W is declared 2 times": {"parameters": 2 * heater.PARAMETERS},
@@ -172,19 +173,13 @@ REFUSED_DECLARATIONS = {
     r"spare is a collection of conditions: write \['sweep 4 W'\]": {"spare": "sweep 4 W"},
     r"spare is a collection of conditions: write \[4\]": {"spare": 4},
     "noise_time_s is seconds": {"noise_time_s": "slow"},
-}
+} | {name: {"effects": Effect(name, BEND)} for name in NOT_IN_THETA}
 
 
 @pytest.mark.parametrize("said", REFUSED_DECLARATIONS)
 def test_refuses_a_declaration_saying(said):
     with pytest.raises(DeclarationError, match=said):
         declared(**REFUSED_DECLARATIONS[said])
-
-
-@pytest.mark.parametrize("name", ["correction", "a.b", "gain_K_W", "items"])
-def test_refuses_names_of_effects_that_theta_cannot_have(name):
-    with pytest.raises(DeclarationError, match=name):
-        declared(effects=Effect(name, BEND))
 
 
 @pytest.mark.parametrize("what", ["parameters", "effects", "nuisances", "curves", "experiments"])
@@ -207,37 +202,21 @@ def test_refuses_amounts_that_are_none(told):
 
 
 @pytest.mark.parametrize(
-    "told", [{"spare": ["10 V"]}, {"accuracy": {"temperature": 0.1}}, {"noise_time_s": {"temperature": 1.0}}]
-)
-def test_refuses_what_is_declared_of_nothing(told):
-    with pytest.raises(DeclarationError, match="none of the records has; there are"):
-        with_records(heater.system(**told), heater.records(1))
-
-
-@pytest.mark.parametrize(
-    ("which", "told"),
+    ("said", "told"),
     [
-        ("effect dead_band", {"effects": replace(heater.DEAD, experiments="rum")}),
-        ("curve loss", {"curves": replace(LOSS, experiments="rum")}),
+        ("none of the records has; there are", {"spare": ["10 V"]}),
+        ("none of the records has; there are", {"accuracy": {"temperature": 0.1}}),
+        ("none of the records has; there are", {"noise_time_s": {"temperature": 1.0}}),
+        (
+            "experiments of effect dead_band names 'rum'.*there are run",
+            {"effects": replace(heater.DEAD, experiments="rum")},
+        ),
+        ("experiments of curve loss names 'rum'.*there are run", {"curves": replace(LOSS, experiments="rum")}),
     ],
 )
-def test_refuses_experiments_that_are_none(which, told):
-    with pytest.raises(DeclarationError, match=f"experiments of {which} names 'rum'.*there are run"):
-        with_records(heater.modelled(heater.bare, **told), heater.records(1))
-
-
-REFUSED_EFFECTS = {
-    "effect bend: own phase needs finite bounds, or a scale": {"own": Parameter("phase", "", 0.0, -math.inf, math.inf)},
-    "bend: gain has `at_least`, which is for base parameters": {"parameters": (BEND, replace(GAIN, at_least="by"))},
-    "bend: `frequency` is 'f', which is none of by, gain": {"parameters": (BEND, GAIN), "frequency": "f"},
-    "bend: `frequency` is 'bend.by', which is none of by": {"frequency": "bend.by"},
-}
-
-
-@pytest.mark.parametrize("said", REFUSED_EFFECTS)
-def test_refuses_an_effect_saying(said):
+def test_refuses_what_is_declared_of_nothing(said, told):
     with pytest.raises(DeclarationError, match=said):
-        Effect(**{"name": "bend", "parameters": BEND, **REFUSED_EFFECTS[said]})
+        with_records(heater.modelled(heater.bare, **told), heater.records(1))
 
 
 @pytest.mark.parametrize(
@@ -260,16 +239,27 @@ def test_refuses_a_parameter_that_is_none(told):
         Parameter("gain", "", **{"value": 1.0, "lower": 0.1, "upper": math.inf, **told})
 
 
+UNBOUNDED = {"lower": -math.inf, "upper": math.inf}
+OF_ANOTHER_TYPE = "effect bend: `{}` is|is of type (int|NoneType), not"
+
+
 @pytest.mark.parametrize(
-    "told",
+    ("said", "told"),
     [
-        *({"start_factors": given} for given in ((), (math.nan,), None)),
-        *({"absent": given} for given in (math.nan, None, "0")),
-        *({name: 3} for name in ("parameters", "own", "experiments", "freed_at", "apart")),
+        ("effect bend: own phase needs finite bounds, or a scale", {"own": replace(BEND, name="phase", **UNBOUNDED)}),
+        (
+            "bend: gain has `at_least`, which is for base parameters",
+            {"parameters": (BEND, replace(GAIN, at_least="by"))},
+        ),
+        ("bend: `frequency` is 'f', which is none of by, gain", {"parameters": (BEND, GAIN), "frequency": "f"}),
+        ("bend: `frequency` is 'bend.by', which is none of by", {"frequency": "bend.by"}),
+        *((OF_ANOTHER_TYPE.format(key), {key: 3}) for key in ("parameters", "own", "experiments", "freed_at", "apart")),
+        *((OF_ANOTHER_TYPE.format("start_factors"), {"start_factors": given}) for given in ((), (math.nan,), None)),
+        *((OF_ANOTHER_TYPE.format("absent"), {"absent": given}) for given in (math.nan, None, "0")),
     ],
 )
-def test_refuses_an_effect_that_is_none(told):
-    with pytest.raises(DeclarationError, match=f"effect bend: `{next(iter(told))}` is|is of type (int|NoneType), not"):
+def test_refuses_an_effect_that_is_none(said, told):
+    with pytest.raises(DeclarationError, match=said):
         Effect(**{"name": "bend", "parameters": BEND, **told})
 
 
@@ -434,9 +424,8 @@ def test_a_gap_in_an_input_of_every_record_is_the_reason_why_nothing_is_predicte
 
 
 def test_warns_of_an_input_with_a_gap():
-    given = heater.records(2)
-    for one in given.values():
-        one["outside_C"] = np.where(np.arange(len(one["time_s"])) == 7, np.nan, 20.0)
+    outside_C = np.where(np.arange(len(heater.TIME_S)) == 7, np.nan, 20.0)
+    given = {name: one | {"outside_C": outside_C} for name, one in heater.records(2).items()}
     said = said_of(given)
     assert len(said) >= len(given)
     assert all("input outside_C: no number at sample 7" in sentence for sentence in said[: len(given)])
@@ -468,10 +457,7 @@ def test_milliseconds_are_pointed_out_where_no_parameter_is_a_time():
 
 
 def test_which_of_two_clocks_was_taken_is_said():
-    given = heater.records(2)
-    for one in given.values():
-        one["t"] = np.arange(len(one["time_s"]))
-    said = said_of(given)
+    said = said_of({name: one | {"t": np.arange(len(one["time_s"]))} for name, one in heater.records(2).items()})
     assert any("times were taken from its column time_s; t is an input" in one for one in said)
 
 

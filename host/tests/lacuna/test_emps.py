@@ -45,17 +45,15 @@ def test_reaches_the_published_errors_on_both_records(emps, verdict):
     """The RMS error over 1 s windows, each started at its measured position and speed, as for SciPy's fits."""
 
     def rmse_mm(file, theta):
-        records = [t.record(["position_mm"]) for t in emps.windows(emps.read(DATA / file))]
-        errors = [_predicted(emps, r, theta) - r["position_mm"] for r in records]
+        errors = []
+        for record in (table.record(["position_mm"]) for table in emps.windows(emps.read(DATA / file))):
+            predicted = emps.simulate(record, Values(theta | {"v_m_s": record["speed_m_s"][0]}))
+            errors.append(predicted["position_mm"] - record["position_mm"])
         return np.sqrt(np.mean(np.concatenate(errors) ** 2))
 
     theta = emps.system.values({}) | verdict.theta
     assert rmse_mm("DATA_EMPS.mat", theta) <= 0.407
     assert rmse_mm("DATA_EMPS_PULSES.mat", theta) <= 1.388
-
-
-def _predicted(emps, record, theta):
-    return emps.simulate(record, Values(theta | {"v_m_s": record["speed_m_s"][0]}))["position_mm"]
 
 
 def test_rejects_the_decoy_where_the_pulses_were_applied(emps):

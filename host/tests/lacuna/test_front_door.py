@@ -31,11 +31,13 @@ LAG = {"sensor_lag__lag_s": 3.0}
 LIMIT = {"saturation__limit_W": 6.0}
 
 
-def test_names_what_a_plain_function_lacks(verdict):
+def test_names_what_a_plain_function_lacks_with_the_share_that_it_closes(verdict):
     assert verdict.verdict == "identified"
     assert [e.name for e in verdict.effects] == ["sensor_lag"]
     assert verdict.effects[0].parameters["lag_s"] == pytest.approx(3.0, rel=0.1)
     assert verdict.error["after"] < 1.15 * verdict.error["floor"]
+    (effect,) = verdict.record["effects"]
+    assert effect["share_of_gap"] == pytest.approx(1.0 - verdict.record["remainder"]["share_of_gap"], abs=1e-4)
 
 
 @pytest.mark.parametrize("written", [heater.LIMITED, heater.INVERSE], ids=["limit", "inverse"])
@@ -50,7 +52,7 @@ def test_a_limit_and_its_inverse_are_the_same_effect(written):
     assert lower < value < upper
 
 
-def test_the_completed_model_is_called_like_the_first(verdict):
+def test_the_completed_model_is_called_like_the_first_and_refuses_a_record_that_lacks_an_input(verdict):
     given = {"time_s": heater.TIME_S, "power_W": heater.power("steps", 7.0)}
     truth = heater.measured(given["power_W"], 0, **LAG)
     predicted = verdict.model(given)["temperature_K"]
@@ -59,6 +61,8 @@ def test_the_completed_model_is_called_like_the_first(verdict):
     assert np.std(without - truth) > 3 * heater.NOISE_K
     lower, upper = verdict.effects[0].interval["lag_s"]
     assert lower < verdict.theta.sensor_lag.lag_s < upper
+    with pytest.raises(lacuna.LacunaError, match="finds no power_W: record record 1 has time_s"):
+        verdict.model({"time_s": heater.TIME_S})
 
 
 def test_the_completed_model_knows_every_record(verdict):
@@ -67,11 +71,6 @@ def test_the_completed_model_knows_every_record(verdict):
     residuals = heater.residuals_of(heater.records(seed=1, **LAG).values(), names)
     fitted = least_squares(residuals, [verdict.theta[name] for name in names], x_scale=[0.1, 1.0, 0.1]).x
     assert [verdict.theta[name] for name in names] == pytest.approx(fitted, rel=2e-4)
-
-
-def test_a_record_that_lacks_an_input_is_refused_by_the_completed_model(verdict):
-    with pytest.raises(lacuna.LacunaError, match="finds no power_W: record record 1 has time_s"):
-        verdict.model({"time_s": heater.TIME_S})
 
 
 def test_a_curve_that_was_learnt_is_part_of_the_screen(verdict):
@@ -98,11 +97,6 @@ def test_it_is_said_of_what_is_supported_that_it_explains_too_little(monkeypatch
     assert found.verdict == "unexplained"
     assert found.warnings[0].startswith("sensor_lag predicts better beyond doubt, but explains too little")
     assert "though not named: sensor_lag" in str(found)
-
-
-def test_an_effect_closes_what_the_verdict_says_that_it_does(verdict):
-    (effect,) = verdict.record["effects"]
-    assert effect["share_of_gap"] == pytest.approx(1.0 - verdict.record["remainder"]["share_of_gap"], abs=1e-4)
 
 
 def test_what_the_data_would_hardly_show_was_not_seen_at_any_size():

@@ -13,7 +13,7 @@ from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
-from lacuna.records import Table, attach_run, segments
+from lacuna.records import Table, segments
 from lacuna.run import with_records
 
 
@@ -93,7 +93,7 @@ def test_the_completed_model_of_a_segment_gives_its_own_samples():
     noise = 0.01 * np.random.default_rng(0).standard_normal(400)
     pieces = segments(Table("long", time, {"y": 2.0 * time + 0.3 * time**2 + noise}, {}), 10)
     verdict = lacuna.diagnose(system, pieces, progress=False)
-    trial = attach_run(pieces[5], pieces[5].record(["y"]), ["y"])
+    trial = pieces[5].record(["y"])
     for asked in (pieces[5], trial):
         np.testing.assert_allclose(verdict.model(asked)["y"], pieces[5].columns["y"], atol=0.05)
 

@@ -14,17 +14,13 @@ from lacuna.diagnosis.record import as_record
 from lacuna.errors import MisuseError
 
 
-def test_parameters_come_as_a_table_with_their_intervals(verdict):
+def test_parameters_with_intervals_and_explanations_with_standard_errors_come_as_tables(verdict):
     pytest.importorskip("pandas")
     frame = verdict.to_frame()
     assert list(frame.index) == list(verdict.theta)
     lag = frame.loc["sensor_lag.lag_s"]
     assert lag["lower_90"] < lag["value"] < lag["upper_90"]
     assert frame.notna().all(axis=None)
-
-
-def test_explanations_are_compared_with_differences_and_their_standard_errors(verdict):
-    pytest.importorskip("pandas")
     frame = verdict.to_frame("compared").set_index("effects")
     assert frame.loc["sensor_lag", "worse_by"] == frame.loc["sensor_lag", "standard_error"] == 0.0
     assert frame.loc["base model", "worse_by"] > 2 * frame.loc["base model", "standard_error"] > 0.0

@@ -102,7 +102,7 @@ def test_even_times_stay_as_they_are_and_uneven_ones_become_even():
     np.testing.assert_allclose(resample_evenly(uneven, 3.0 * uneven + 1.0), expected, rtol=1e-9)
 
 
-def test_samples_on_either_side_of_a_gap_are_no_neighbours():
+def test_samples_on_either_side_of_a_gap_and_missing_ones_are_no_neighbours():
     """If two distant stretches of a slow trace were joined, they would seem correlated across the gap."""
     draw = np.random.default_rng(2)
     parts = [np.convolve(draw.standard_normal(2000), np.ones(20), mode="same") / 4.5 for _ in range(2)]
@@ -113,6 +113,10 @@ def test_samples_on_either_side_of_a_gap_are_no_neighbours():
     holes = np.where(np.arange(6000) % 60 < 30, np.tile(period, 100), np.nan)
     halves = holes[np.isfinite(holes)]
     assert correlation_samples([holes]) != pytest.approx(correlation_samples([halves]), rel=0.2)
+    smooth = np.convolve(np.random.default_rng(0).standard_normal(4000), np.ones(5) / 5, mode="same")
+    sparse = np.full(len(smooth) * 4, np.nan)
+    sparse[::4] = smooth
+    assert correlation_samples([sparse]) == correlation_samples([smooth]) > 4.0
 
 
 def blurred(time_s, y):

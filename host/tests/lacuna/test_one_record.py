@@ -189,20 +189,25 @@ def test_where_a_raised_floor_hides_everything_the_first_answer_stands():
     assert compare_at_misfit(heater.system(), first, lambda system: _found("none", 1.0, 0.05)) == (first, {})
 
 
+def power_law(gain, effect, power, **told):
+    """y = gain u, and an effect in a power of u."""
+
+    def simulate(record, theta):
+        return theta.gain * record["u"] + theta[f"{effect.name}.gain"] * record["u"] ** power
+
+    return lacuna.System(simulate, gain, effect, outputs="y", **told)
+
+
 @pytest.mark.parametrize(("cubic", "verdict"), [(0.3, "identified"), (0.0, "none")])
 def test_a_record_that_is_itself_fast_does_not_pass_for_noise(cubic, verdict):
     """At nine samples per period, second differences of the record do not measure the noise."""
     draw, time_s = np.random.default_rng(0), np.arange(0.0, 1.0, 0.002)
 
-    def simulate(record, theta):
-        return {"y": theta.gain * record["u"] + theta.cubic.gain * record["u"] ** 3}
-
     def measured(size):
         u = size * np.cos(2 * np.pi * 55.0 * time_s + draw.uniform(0.0, 6.0)) * (1.0 + 0.3 * np.sin(7.0 * time_s))
         return {"time_s": time_s, "u": u, "y": u + cubic * u**3 + 1e-3 * draw.standard_normal(len(u))}
 
-    effect = Effect("cubic", Parameter("gain", "", 0.1, -2.0, 2.0))
-    system = lacuna.System(simulate, Parameter("gain", "", 0.8, 0.0, 5.0), effect)
+    system = power_law(Parameter("gain", "", 0.8, 0.0, 5.0), Effect("cubic", Parameter("gain", "", 0.1, -2.0, 2.0)), 3)
     found = lacuna.diagnose(system, [measured(0.2 + 0.1 * k) for k in range(8)], progress=False)
     assert found.verdict == verdict
     assert "Repeats share" not in str(found)
@@ -222,14 +227,7 @@ def test_fast_noise_that_is_not_even_may_be_declared(kind):
 
     def found(**told):
         cubic = Effect("cubic", Parameter("gain", "", 0.01, -1.0, 1.0))
-        gain = Parameter("gain", "", 1.5, 0.0, 5.0)
-        model = lacuna.System(
-            lambda record, theta: theta.gain * record["u"] + theta.cubic.gain * record["u"] ** 3,
-            gain,
-            cubic,
-            outputs="y",
-            **told,
-        )
+        model = power_law(Parameter("gain", "", 1.5, 0.0, 5.0), cubic, 3, **told)
         return lacuna.diagnose(model, records, progress=False)
 
     first = found()
@@ -242,19 +240,16 @@ def test_fast_noise_that_is_not_even_may_be_declared(kind):
 @pytest.mark.parametrize("bend", [0.0, 0.2])
 def test_a_table_in_no_order_does_not_hide_what_its_residual_follows(bend):
     draw = np.random.default_rng(4)
-    x = draw.uniform(0.0, 5.0, 200)
-    table = {"x": x, "y": 2.0 * x + bend * x**2 + 0.02 * draw.standard_normal(200)}
-    square = Effect("square", Parameter("by", "", 0.1, -3.0, 3.0))
-    gain = Parameter("gain", "", 1.5, -5.0, 5.0)
-    model = lacuna.System(
-        lambda record, theta: theta.gain * record["x"] + theta.square.by * record["x"] ** 2, gain, square, outputs="y"
-    )
+    u = draw.uniform(0.0, 5.0, 200)
+    table = {"u": u, "y": 2.0 * u + bend * u**2 + 0.02 * draw.standard_normal(200)}
+    square = Effect("square", Parameter("gain", "", 0.1, -3.0, 3.0))
+    model = power_law(Parameter("gain", "", 1.5, -5.0, 5.0), square, 2)
 
     def found(order):
         rows = {"time_s": np.arange(200), **{name: column[order] for name, column in table.items()}}
         return lacuna.diagnose(model, lacuna.segments(rows), progress=False)
 
-    shuffled, ordered = found(np.arange(200)), found(np.argsort(x))
+    shuffled, ordered = found(np.arange(200)), found(np.argsort(u))
     said = [warning for warning in shuffled.warnings if "sort them by that" in warning]
     assert (shuffled.verdict, len(said)) == ("none", 1 if bend else 0)
     assert ordered.verdict == ("identified" if bend else "none")

@@ -98,13 +98,10 @@ def chosen(*candidates, matters=lambda one, other: True, policy=POLICY):
     return choose(found(*candidates), policy, matters)
 
 
-def test_gain_an_effect_must_bring_more_than_chance():
+def test_gain_an_effect_must_bring_more_than_chance_in_units_of_what_the_best_explanation_leaves():
     least = POLICY.gain
     assert worse(tried((), 40.0), tried(("a",), 40.0 - 1.1 * least), tried((), 40.0))
     assert not worse(tried((), 40.0), tried(("a",), 40.0 - 0.9 * least), tried((), 40.0))
-
-
-def test_gain_counts_in_units_of_what_the_best_explanation_leaves():
     one, other = tried((), 1300.0), tried(("a",), 1000.0)
     assert worse(one, other)
     assert not worse(one, other, policy=replace(POLICY, gain=160.0)), "300, halved: twice the floor is left"

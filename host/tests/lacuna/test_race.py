@@ -40,29 +40,30 @@ def lines(shapes, sizes, seed=0) -> lacuna.System:
     return with_records(system, records)
 
 
-def linear(sizes) -> Case:
-    return case_of(lines(SHAPES, sizes))
+def linear(sizes) -> tuple[Case, Candidate]:
+    """The case of a linear model, and its base fit."""
+    case = case_of(lines(SHAPES, sizes))
+    return case, case.judge(case.fit_base(1))
 
 
-def scored(case, base=None):
-    return score(base or case.fit_base(1), list(case.system.effects), NOBODY)
+def scored(case, base):
+    return score(base.fitted, list(case.system.effects), NOBODY)
 
 
 def test_the_score_of_one_effect_is_what_a_fit_with_it_gains():
     """In a linear model the score is exact, up to three times the size at which the secant was taken."""
-    case = linear({"a": 0.03})
-    base = case.fit_base(1)
+    case, base = linear({"a": 0.03})
     promises = scored(case, base).singles()
     assert promises[0].effect == "a"
     fitted = race_module.solve(promises[0].problem, promises[0].start)
-    residuals = np.concatenate(base.problem.residuals(base.solution.point))
+    residuals = np.concatenate(base.fitted.problem.residuals(base.fitted.solution.point))
     assert np.abs(residuals).max() < 5.0, "hardly any residual is compressed"
-    assert promises[0].gain == pytest.approx(base.cost - fitted.cost, rel=0.05)
+    assert promises[0].gain == pytest.approx(base.fitted.cost - fitted.cost, rel=0.05)
 
 
 @pytest.mark.parametrize("effects", [("a",), ("b", "c")])
 def test_a_secant_is_followed_only_forwards_and_not_too_far(effects):
-    found = scored(linear(dict.fromkeys(effects, 0.3)))
+    found = scored(*linear(dict.fromkeys(effects, 0.3)))
     for promise in found.singles():
         secant = next(k for k, one in enumerate(found.secants) if one.start is promise.start)
         assert promise.gain >= 0.0
@@ -84,20 +85,19 @@ def test_what_is_suspected_is_fitted_whatever_it_promises():
 
 
 def test_what_the_base_can_do_is_absorbed_and_says_nothing():
-    found = {s.effect: s for s in scored(linear({"a": 0.03})).screened()}
+    found = {s.effect: s for s in scored(*linear({"a": 0.03})).screened()}
     assert found["d"].absorbed
     assert not found["d"].detectable
     assert found["a"].detectable
 
 
 def test_a_race_ends_where_one_is_enough_and_runs_on_where_none_is(monkeypatch):
-    case = linear({"a": 0.03})
-    base = case.judge(case.fit_base(1))
+    case, base = linear({"a": 0.03})
     begun, before = [], race_module.coarse_fits
     monkeypatch.setattr(
         race_module, "coarse_fits", lambda parent, some, *more: begun.extend(some) or before(parent, some, *more)
     )
-    given = scored(case, base.fitted).singles()
+    given = scored(case, base).singles()
     found = race(base, given, 3, split=case.split, enough=lambda c: True, workers=NOBODY)
     least = POLICY.rival * given[0].gain
     assert [one.gain for one in begun] == [one.gain for k, one in enumerate(given) if k < 2 or one.gain > least]
@@ -135,9 +135,8 @@ def test_a_set_begun_cold_owes_nothing_to_a_lost_parent():
 
 
 def test_a_set_that_costs_more_than_one_it_contains_begins_from_that_one(monkeypatch):
-    case = linear({"a": 0.03, "b": 0.02})
-    base = case.judge(case.fit_base(1))
-    one = next(e for e in scored(case, base.fitted).singles() if e.problem.structure.effects == ("a",))
+    case, base = linear({"a": 0.03, "b": 0.02})
+    one = next(e for e in scored(case, base).singles() if e.problem.structure.effects == ("a",))
     nowhere = race_module.solve(one.problem, one.problem.start(cold_starts(one)[0] + 3.0), max_iterations=0)
     monkeypatch.setattr(race_module, "cold", lambda problem, values: nowhere)
     assert nowhere.cost > base.fitted.cost
@@ -177,10 +176,8 @@ def test_what_is_fitted_to_the_end_is_never_worse():
 
 
 def test_two_that_are_joined_are_as_they_are_in_each():
-    case = linear({"a": 0.03, "b": 0.02, "c": 0.01})
-    base = case.judge(case.fit_base(1))
-    promises = scored(case, base.fitted).singles()
-    of = {p.effect: Fit(p.problem, race_module.solve(p.problem, p.start), 1, 1) for p in promises}
+    promises = scored(*linear({"a": 0.03, "b": 0.02, "c": 0.01})).singles()
+    of = {p.effect: Fit(p.problem, race_module.solve(p.problem, p.start)) for p in promises}
     both = joined(of["a"], of["b"], 5.0)
     assert (both.problem.structure.effects, both.gain) == (("a", "b"), 5.0)
     begun = both.problem.structure.theta(both.start.values)

@@ -25,10 +25,13 @@ def conditioned(condition):
     return "time_s,y,condition\n" + "".join(f"{k},{k * k},{condition}\n" for k in range(10))
 
 
-def test_conditions_in_words_make_repeats(tmp_path):
-    for name in ("monday.csv", "tuesday.csv"):
-        write(tmp_path, name, conditioned("heat 2 W"))
-    assert {table.record(["y"]).condition for table in read(tmp_path)} == {"heat 2 W"}
+@pytest.mark.parametrize(
+    "said", [{"monday": "heat 2 W", "tuesday": "heat 2 W"}, {"step_4": "4 bar", "step_6": "6 bar"}], ids=str
+)
+def test_conditions_in_words_make_repeats_whatever_the_numbers_of_the_files(tmp_path, said):
+    for name, condition in said.items():
+        write(tmp_path, f"{name}.csv", conditioned(condition))
+    assert {table.name: table.record(["y"]).condition for table in read(tmp_path)} == said
 
 
 def test_a_spreadsheets_mark_is_no_part_of_the_first_name(tmp_path):
@@ -129,13 +132,12 @@ def test_parts_of_several_runs_go_together_by_the_runs_names():
     assert len({part.labels["condition"] for part in cut}) == 2, "the same phase of a cycle, in whichever run"
 
 
-@pytest.mark.parametrize(
-    ("cut", "samples"), [(lambda one: windows(one, 10.0), 10), (lambda one: segments(one, 10), 10)]
-)
-def test_every_column_of_an_input_is_cut(cut, samples):
-    parts = cut({"time_s": np.arange(100.0), "y": np.arange(100.0), "wind": np.arange(300.0).reshape(100, 3)})
-    assert [part.columns["wind"].shape for part in parts] == [(samples, 3)] * 10
+@pytest.mark.parametrize("cut", [lambda one: windows(one, 10.0), lambda one: segments(one, 10)])
+def test_parts_of_a_record_have_every_column_of_an_input_and_the_name_of_its_clock(cut):
+    parts = cut({"t": np.arange(100.0), "y": np.arange(100.0), "wind": np.arange(300.0).reshape(100, 3)})
+    assert [part.columns["wind"].shape for part in parts] == [(10, 3)] * 10
     assert parts[3].columns["wind"][0].tolist() == [90.0, 91.0, 92.0]
+    assert {part.clock for part in parts} == {"t"}
 
 
 def test_a_function_of_time_is_not_cut_into_windows_whose_times_restart():
@@ -143,11 +145,6 @@ def test_a_function_of_time_is_not_cut_into_windows_whose_times_restart():
     with pytest.raises(RecordError, match="record 1, input load_N: a function does not follow the times of windows"):
         windows(long, 10.0)
     assert segments(long, 10)[5].columns["load_N"] is np.sin
-
-
-@pytest.mark.parametrize("cut", [lambda one: windows(one, 10.0), lambda one: segments(one, 10)])
-def test_parts_of_a_record_keep_the_name_of_its_clock(cut):
-    assert {part.clock for part in cut({"t": np.arange(100.0), "y": np.arange(100.0)})} == {"t"}
 
 
 REFUSED_ARRAYS = {
@@ -217,12 +214,6 @@ def test_numbers_that_do_not_count_repeats_may_be_settings(tmp_path, numbers):
 @pytest.mark.parametrize("numbers", [("1", "2", "3"), ("0", "1"), ("01", "02"), ("7",)])
 def test_numbers_that_count_make_repeats(tmp_path, numbers):
     assert {table.labels["condition"] for table in read(numbered(tmp_path, "step", numbers))} == {"step"}
-
-
-def test_a_column_says_what_numbers_are(tmp_path):
-    for bar in (4, 6):
-        write(tmp_path, f"step_{bar}.csv", conditioned(f"{bar} bar"))
-    assert [table.labels["condition"] for table in read(tmp_path)] == ["4 bar", "6 bar"]
 
 
 def test_what_systems_and_office_programs_leave_is_no_record(tmp_path):

@@ -99,20 +99,11 @@ def test_settled_estimates_scatter_as_they_say():
     assert np.std(after) < 1.2 < 1.4 < np.std(before)
 
 
-@pytest.fixture(scope="module")
-def stopped():
-    """Fits at the upper bound of `bent`; the truth lies five standard deviations beyond it."""
-    return [fitted(Lines(runs=2, upper=1.5, seed=seed)) for seed in SEEDS]
-
-
-def test_a_fit_stopped_by_a_bound_stays_as_it_is(stopped):
-    for one in stopped:
+def test_a_fit_that_a_bound_stopped_there_or_just_short_of_it_stays_as_it_is():
+    """The truth lies five standard deviations beyond the upper bound of `bent`."""
+    for one in (fitted(Lines(runs=2, upper=1.5, seed=seed)) for seed in SEEDS):
         assert list(one.at_bound) == [False, True]
         assert settle(one) is one
-
-
-def test_a_search_that_ended_just_short_of_a_bound_was_stopped_by_it_too(stopped):
-    for one in stopped:
         assert list(moved(one, bent=1.5 - 0.1 * stated_sd(one)[1]).at_bound) == [False, True]
         assert not moved(one, bent=1.5 - 0.4 * stated_sd(one)[1]).at_bound.any()
 

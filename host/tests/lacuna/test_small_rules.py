@@ -12,13 +12,11 @@ from lacuna import Effect, Parameter
 from lacuna.diagnosis.next_experiment import expected_gain
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import Error, Floor
-from lacuna.diagnosis.sizes import grown, sized, starts
-from lacuna.diagnosis.spectrum import peaks
+from lacuna.diagnosis.sizes import grown, peaks, sized, starts
 from lacuna.diagnosis.warn import not_predicted
 from lacuna.estimation.fit import fit
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
 from lacuna.estimation.problem import usable_cores
-from lacuna.estimation.sampling import correlation_samples
 from lacuna.estimation.structure import Structure
 from lacuna.system import CandidateExperiment, Record
 
@@ -47,15 +45,6 @@ def test_an_experiment_never_run_is_weighed_by_what_its_channel_has_had_elsewher
 
     assert gain("pull") == 20.0
     assert gain("step") == gain("walk") == 5.0
-
-
-def test_missing_samples_are_no_neighbours():
-    draw = np.random.default_rng(0)
-    noise = draw.standard_normal(4000)
-    smooth = np.convolve(noise, np.ones(5) / 5, mode="same")
-    sparse = np.full(len(smooth) * 4, np.nan)
-    sparse[::4] = smooth
-    assert correlation_samples([sparse]) == correlation_samples([smooth]) > 4.0
 
 
 def test_a_frequency_that_no_record_resolves_begins_at_its_typical_value():

@@ -64,14 +64,11 @@ def test_a_verdict_without_held_out_trials_can_be_told(count, tmp_path):
     assert verdict.plot()
 
 
-def test_what_a_person_makes_the_test_informs_nothing():
+def test_what_a_person_makes_the_test_informs_nothing_and_may_be_of_an_experiment_of_its_own():
     split = split_trials(trials(*"aaabbb"), (), ["0", "5"])
     assert names(split.final) == ["0", "5"]
     assert not {"0", "5"} & set(names(split.known + split.unseen))
     assert len(split.fit + split.judging + split.final) == 6
-
-
-def test_what_a_person_makes_the_test_is_it_though_it_is_of_an_experiment_of_its_own():
     given = (*trials(*"aabbcc"), Record("v", "validation", "v", T, {"y": T}))
     assert names(split_trials(given, (), ["v"]).final) == ["v"]
 

@@ -18,8 +18,10 @@ NAMES = [("one",), ("two",), ("three",)]
 JOBS = [(1,), (2,), (3,)]
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def cores():
+    """Two cores, or as many as a test asks for."""
+    use_threads(2)
     yield use_threads
     use_threads(None)
 
@@ -31,8 +33,7 @@ def test_results_come_in_the_order_of_the_items_whatever_is_begun_first(cores, c
     assert in_parallel(str, [], work=[]) == []
 
 
-def test_what_is_most_work_is_begun_first(cores):
-    cores(2)
+def test_what_is_most_work_is_begun_first():
     begun, second = [], Event()
 
     def note(item: str) -> None:
@@ -46,8 +47,7 @@ def test_what_is_most_work_is_begun_first(cores):
     assert begun == ["long", "middle", "short"]
 
 
-def test_children_answer_in_order_what_need_not_be_shipped(cores):
-    cores(2)
+def test_children_answer_in_order_what_need_not_be_shipped():
     said = []
     found = Workers(said.append, forks=True).map("trying", NAMES, lambda x: (10 * x, os.getpid()), JOBS)
     assert [value for value, _ in found] == [10, 20, 30]
@@ -63,35 +63,30 @@ def test_one_core_or_one_job_needs_no_children_and_a_system_may_forbid_them(core
     assert set(found) == {os.getpid()}
 
 
-def test_where_children_cannot_be_synchronized_there_are_none(cores, monkeypatch):
+def test_where_children_cannot_be_synchronized_there_are_none(monkeypatch):
     """As without a writable /dev/shm."""
 
     def refuse(*_):
         raise OSError(errno.EROFS, "Read-only file system")
 
-    cores(2)
     monkeypatch.setattr("_multiprocessing.SemLock", refuse)
     found = Workers(lambda _: None, forks=True).map("trying", NAMES, lambda _: os.getpid(), JOBS)
     assert set(found) == {os.getpid()}
 
 
-def test_an_executor_is_preferred_to_children(cores):
-    cores(2)
+def test_an_executor_is_preferred_to_children():
     with ThreadPoolExecutor(2) as pool:
         found = Workers(lambda _: None, pool, forks=True).map("trying", NAMES, lambda _: os.getpid(), JOBS)
     assert set(found) == {os.getpid()}
 
 
-def test_what_goes_wrong_in_a_child_is_said(cores):
-    cores(2)
+def test_what_goes_wrong_in_a_child_is_said():
     with pytest.raises(ZeroDivisionError):
         Workers(lambda _: None, forks=True).map("trying", NAMES, lambda x: 1 // (x - 2), JOBS)
     assert not active_children()
 
 
-def test_an_interruption_leaves_no_child_at_work(cores):
-    cores(2)
-
+def test_an_interruption_leaves_no_child_at_work():
     def interrupted(_: str) -> None:
         raise KeyboardInterrupt
 

@@ -21,7 +21,7 @@ from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.split import split_trials
 from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.fit import Fit, fit, starting_point
+from lacuna.estimation.fit import Fit, fit
 from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
 from lacuna.system import (
@@ -207,7 +207,7 @@ def with_effect(case: Case, effect: str) -> tuple[Candidate, Candidate]:
     """The fitted base model, and a fit with an effect that is warm-started from it."""
     base = case.judge(case.fit_base(1))
     structure = Structure(case.system, (effect,))
-    start = [starting_point(base.fitted, structure)]
+    start = [structure.start(base.fitted.theta)]
     return base, case.judge(fit(structure, case.split.fit, base.fitted.problem.floor, starts=start))
 
 

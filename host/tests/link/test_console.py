@@ -11,6 +11,8 @@ from bifa.link.table import CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, RESU
 from bifa.link.units import BY_NAME, from_wire, range_text
 from harness.board import Board
 
+DEFAULTS = {p.name: f"{from_wire(p.name, p.default):g}" for p in PARAMETERS}
+
 
 def shown(name: str, value: str, at_power_up: str | None = None) -> str:
     """The line of `show` for a parameter at `value`; `at_power_up` is the value that power-up loads, if it differs."""
@@ -18,9 +20,8 @@ def shown(name: str, value: str, at_power_up: str | None = None) -> str:
     def with_unit(text: str) -> str:
         return f"{text} {BY_NAME[name].unit}".rstrip()
 
-    default = f"{from_wire(name, BY_NAME[name].default):g}"
     mark = "" if at_power_up is None else f" * power-up {with_unit(at_power_up)}"
-    return f"[{name} {with_unit(value)} ({range_text(BY_NAME[name])}, default {with_unit(default)}){mark}"
+    return f"[{name} {with_unit(value)} ({range_text(BY_NAME[name])}, default {with_unit(DEFAULTS[name])}){mark}"
 
 
 def places(value: str) -> str:
@@ -29,7 +30,7 @@ def places(value: str) -> str:
     return f"{whole}.{decimals:0<3}"
 
 
-SHOWN = [shown(p.name, f"{from_wire(p.name, p.default):g}") for p in PARAMETERS]
+SHOWN = [shown(name, default) for name, default in DEFAULTS.items()]
 PERIOD = shown("period_s", "5.7")
 
 
@@ -56,11 +57,9 @@ def test_help_names_every_command_and_parameter(board):
         assert usage in text
         assert help_text in text
         assert board.type(f"help {name}") == [f"[{usage}  {help_text}", "ok"]
-    for parameter in PARAMETERS:
+    for parameter, line in zip(PARAMETERS, SHOWN, strict=True):
         assert parameter.name in text
-        about = board.type(f"help {parameter.name}")
-        default = f"{from_wire(parameter.name, parameter.default):g}"
-        assert about == [f"[{parameter.name}  {parameter.help}", shown(parameter.name, default), "ok"]
+        assert board.type(f"help {parameter.name}") == [f"[{parameter.name}  {parameter.help}", line, "ok"]
 
 
 def test_set_says_the_old_and_the_new_value_and_show_what_is_now(board):
@@ -95,12 +94,11 @@ def test_show_marks_what_power_up_would_change(board):
 
 
 def test_the_longest_line_of_a_parameter_fits_80_columns(board):
-    for parameter in PARAMETERS:
-        longest = [from_wire(parameter.name, parameter.maximum - less) for less in (1, 2)]
-        board.type(f"set {parameter.name} {longest[0]:.6f}")
-    board.type("save")
-    for parameter in PARAMETERS:
-        board.type(f"set {parameter.name} {from_wire(parameter.name, parameter.maximum - 2):.6f}")
+    for less in (1, 2):
+        for parameter in PARAMETERS:
+            board.type(f"set {parameter.name} {from_wire(parameter.name, parameter.maximum - less):.6f}")
+        if less == 1:
+            board.type("save")
     lines = board.type("show")
     assert all("* power-up" in line for line in lines[:-1])
     assert max(map(len, lines)) <= 80

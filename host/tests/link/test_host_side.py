@@ -1,6 +1,7 @@
-"""The host's own part of the link: units, versions, samples, clocks."""
+"""The host's own part of the link: units, versions, samples, clocks, timed holds."""
 
 import itertools
+import math
 import random
 from decimal import Decimal
 
@@ -8,12 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bifa.link import MismatchError, NoAnswerError, Uno, UnoParameterError
+from bifa.link import MismatchError, NoAnswerError, RefusedError, Uno, UnoParameterError
 from bifa.link.clock_relation import ClockRelation
 from bifa.link.frames import Report
-from bifa.link.table import PARAMETERS, TABLE_HASH
+from bifa.link.table import PARAMETERS, SCHEDULE_ENTRIES, TABLE_HASH
 from bifa.link.terminal import type_line
 from bifa.link.units import from_wire, to_wire
+from bifa.link.uno import LATEST_HOLD_S
 from harness.board import Board
 
 
@@ -34,26 +36,20 @@ def test_values_out_of_range_are_refused(parameter, value):
             to_wire(parameter.name, value)
 
 
-def test_a_mismatch_names_both_versions_and_the_command(monkeypatch):
-    board = Board()
+def test_a_mismatch_names_both_versions_and_the_command(board, monkeypatch):
     monkeypatch.setattr("bifa.link.session.TABLE_HASH", TABLE_HASH ^ 1)
     with pytest.raises(MismatchError, match=f"{TABLE_HASH:08x}.*{TABLE_HASH ^ 1:08x}.*bifa flash"):
         Uno(board, board).connect()
 
 
-def test_silence_is_told():
-    class Silent(Board):
-        def read(self, timeout_s: float) -> bytes:
-            super().read(timeout_s)
-            return b""
-
-    silent = Silent()
+def test_silence_is_told(board):
+    read = board.read
+    board.read = lambda timeout_s: read(timeout_s)[:0]
     with pytest.raises(NoAnswerError, match="bifa flash"):
-        Uno(silent, silent).connect(1.0)
+        Uno(board, board).connect(1.0)
 
 
-def test_what_the_uno_says_by_itself_outlasts_the_next_line_typed():
-    board = Board()
+def test_what_the_uno_says_by_itself_outlasts_the_next_line_typed(board):
     with Uno(board, board) as uno:
         uno.connect()
         uno.session.lines.clear()  # its greeting
@@ -111,8 +107,7 @@ def test_time_goes_on_after_a_pause(pause_s):
     assert uno.counters.lost == 100 * pause_s - 2
 
 
-def test_lost_samples_are_counted():
-    board = Board()
+def test_lost_samples_are_counted(board):
     uno = Uno(board, board)
     for number in (65533, 65534, 65535, 65538, 65539, 65539, 65543):
         heard(uno, number)
@@ -122,15 +117,13 @@ def test_lost_samples_are_counted():
     assert samples[0].command[1:] == (0.0, 1.0)
 
 
-def test_samples_that_come_with_the_answer_are_counted_from_where_the_stream_begins():
-    class Batches(Board):
-        """Bytes arrive in batches of some milliseconds, as over USB."""
+def test_samples_that_come_with_the_answer_are_counted_from_where_the_stream_begins(board):
+    def read(timeout_s: float) -> bytes:
+        """Read in batches of some milliseconds, as they come over USB."""
+        board.sleep(0.016)
+        return board.receive()
 
-        def read(self, timeout_s: float) -> bytes:
-            self.sleep(0.016)
-            return self.receive()
-
-    board = Batches()
+    board.read = read
     uno = Uno(board, board)
     uno.connect()
     for _ in range(2):
@@ -180,3 +173,32 @@ def test_exchanges_that_contradict_one_another_widen_the_bound(wobbles):
     for i, wobble_s in enumerate(wobbles):
         host = relation.to_host(float(i))
         assert abs(host.time_s - (100.0 + i + wobble_s)) <= host.bound_s + 2e-6
+
+
+def test_a_refused_schedule_does_not_start(board, connected):
+    with pytest.raises(RefusedError, match="times must not go backwards"):
+        connected.schedule([(0, "body", "positive"), (1, "head", "positive"), (0.5, "body", "off")])
+    for _ in range(50):
+        board.sleep(0.1)
+        assert (board.valves, board.state) == (0, "idle")
+    assert not connected.status().is_schedule_running
+
+
+def test_a_schedule_beyond_the_limit_of_the_uno_is_refused_before_anything_is_sent(board, connected, monkeypatch):
+    connected.schedule([(LATEST_HOLD_S, "body", "off")] * SCHEDULE_ENTRIES)
+    assert connected.status().is_schedule_running
+    monkeypatch.setattr(board, "write", lambda data: pytest.fail("something was sent"))
+    holds = [(i / 10, "body", "off") for i in range(SCHEDULE_ENTRIES + 1)]
+    with pytest.raises(UnoParameterError, match="17 timed holds; the Uno has room for 16"):
+        connected.schedule(holds)
+    for time_s in (-0.001, math.nan, math.inf, LATEST_HOLD_S + 0.001):
+        with pytest.raises(UnoParameterError, match="time of a hold"):
+            connected.schedule([(time_s, "body", "off")])
+
+
+def test_a_schedule_runs_to_its_end(board, connected):
+    connected.schedule([(0.1, "body", "positive"), (0.3, "body", "off")])
+    board.sleep(0.25)
+    assert board.valves != 0
+    board.sleep(0.2)
+    assert (board.valves, board.state) == (0, "idle")

@@ -9,17 +9,20 @@ import pytest
 from bifa.link import RestartedError, Uno
 from bifa.link.frames import STOP_FRAME, encode, session_seed
 from bifa.link.table import COMMANDS
-from harness.chip import Chip
+from harness.chip import Chip, connected
 
 pytestmark = pytest.mark.uno
 FASTEST_S = 100e-6
 
 
-def connected(**options) -> tuple[Chip, Uno]:
-    chip = Chip(**options)
-    uno = Uno(chip, chip, seed=1)
-    uno.connect()
-    return chip, uno
+@pytest.fixture
+def chip() -> Chip:
+    return Chip(keep_events=True)
+
+
+@pytest.fixture
+def uno(chip) -> Uno:
+    return connected(chip)
 
 
 def flood(rng: random.Random, size: int) -> bytes:
@@ -39,9 +42,8 @@ def flood(rng: random.Random, size: int) -> bytes:
 
 
 @pytest.mark.parametrize("stop", [b"!", STOP_FRAME[:-1]], ids=["byte", "frame"])
-def test_a_stop_in_a_flood(stop):
+def test_a_stop_in_a_flood(chip, uno, stop):
     """In a flood of input, a stop acts with its last byte, a stop frame before its delimiter."""
-    chip, uno = connected(keep_events=True)
     rng = random.Random(6)
     worst_s = 0.0
     for _ in range(25):
@@ -56,8 +58,7 @@ def test_a_stop_in_a_flood(stop):
     assert worst_s < FASTEST_S
 
 
-def test_a_stray_delimiter_hides_a_stop_no_longer_than_20_ms():
-    chip, uno = connected()
+def test_a_stray_delimiter_hides_a_stop_no_longer_than_20_ms(chip, uno):
     for before, pause_s in ((b"\0", 0.0215), (b"\0\0abc", 0.0215), (b"\0" + b"x" * 20, 0.0)):
         uno.clear()
         uno.run()
@@ -69,8 +70,7 @@ def test_a_stray_delimiter_hides_a_stop_no_longer_than_20_ms():
         assert chip.valves() == 0, before
 
 
-def test_a_stop_byte_inside_a_frame_is_no_stop():
-    chip, uno = connected()
+def test_a_stop_byte_inside_a_frame_is_no_stop(chip, uno):
     uno.run()
     chip.sleep(0.1)
     chip.write(b"\0ab!cd\0")
@@ -78,8 +78,7 @@ def test_a_stop_byte_inside_a_frame_is_no_stop():
     assert uno.status().state == "running"
 
 
-def test_timed_holds_happen_on_their_ticks():
-    chip, uno = connected()
+def test_timed_holds_happen_on_their_ticks(chip, uno):
     holds = [(0.1, "body", "positive"), (0.2, "head", "vacuum"), (0.35, "body", "off"), (0.351, "head", "off")]
     uno.schedule(holds)
     began_s, seen, last = chip.now(), [], 0
@@ -93,8 +92,7 @@ def test_timed_holds_happen_on_their_ticks():
     assert gaps == [100, 150, 1]
 
 
-def test_a_set_takes_over_at_the_cycle_boundary():
-    _, uno = connected()
+def test_a_set_takes_over_at_the_cycle_boundary(uno):
     uno.upload({"period_s": 2.0})
     uno.run()
     uno.stream(True)
@@ -107,9 +105,8 @@ def test_a_set_takes_over_at_the_cycle_boundary():
     assert uno.counters.lost == 0
 
 
-def test_a_committed_set_shows_10_to_20_ms_after_the_boundary():
+def test_a_committed_set_shows_10_to_20_ms_after_the_boundary(uno):
     """A set is applied with the first sample past the boundary; the sample after that one is the first to show it."""
-    _, uno = connected()
     uno.upload({"period_s": 1.237})
     uno.run()
     uno.stream(True)
@@ -135,8 +132,7 @@ def test_a_committed_set_shows_10_to_20_ms_after_the_boundary():
     assert 17 < max(delays_ms) <= 20
 
 
-def test_a_set_on_the_console_acts_at_once():
-    chip, uno = connected()
+def test_a_set_on_the_console_acts_at_once(chip, uno):
     uno.run()
     chip.sleep(1.0)
     assert chip.valves() & 0b11 == 0b10  # the body at vacuum, for the first half of the 5.7 s
@@ -146,8 +142,7 @@ def test_a_set_on_the_console_acts_at_once():
     assert chip.valves() & 0b11 == 0b01
 
 
-def test_telemetry_as_text_and_as_frames_at_once():
-    chip, uno = connected()
+def test_telemetry_as_text_and_as_frames_at_once(chip, uno):
     uno.run()
     uno.stream(True)
     chip.write(b"stream on\n")
@@ -163,43 +158,41 @@ def test_telemetry_as_text_and_as_frames_at_once():
     assert (uno.counters.lost, uno.counters.bad) == (0, 0)
 
 
-def test_presets_survive_the_power():
-    chip, uno = connected()
+def test_presets_survive_the_power(chip, uno):
     uno.upload({"period_s": 2.72, "duty_body": 0.6535}, save="fast")
     uno.set("period_s", 9.0)
     uno.save("startup")
     image = chip.uno.eeprom
     chip.close()
-    _, uno = connected(eeprom=image)
+    uno = connected(Chip(eeprom=image))
     assert uno.get("period_s") == 9.0
     assert uno.presets() == {"baseline": False, "obstacle": False, "fast": True, "startup": True}
     uno.load("fast")
     assert (uno.get("period_s"), uno.get("duty_body")) == (2.72, 0.6535)
 
 
-def test_power_cuts_in_the_middle_of_a_save():
-    chip, uno = connected()
+def test_power_cuts_in_the_middle_of_a_save(chip, uno):
     uno.upload({"period_s": 3.0}, save="mine")
     image = chip.uno.eeprom
     chip.close()
     rng = random.Random(2)
     for n in sorted(rng.sample(range(1, 92), 8)):
-        chip, uno = connected(eeprom=image)
-        uno.upload({"period_s": 4.0})
+        chip = Chip(eeprom=image)
+        connected(chip).upload({"period_s": 4.0})
         chip.uno.cut_power_at_eeprom_write(n, rng.random())
         chip.write(b"save mine\n")
         chip.sleep(0.5)
         assert not chip.uno.powered
         after = chip.uno.eeprom
         chip.close()
-        chip, uno = connected(eeprom=after)
+        chip = Chip(eeprom=after)
+        uno = connected(chip)
         uno.load("mine")
         assert uno.get("period_s") in (3.0, 4.0)
         chip.close()
 
 
-def test_a_restart_in_the_middle_of_a_session_is_told():
-    chip, uno = connected()
+def test_a_restart_in_the_middle_of_a_session_is_told(chip, uno):
     chip.reset()
     with pytest.raises(RestartedError, match="restarted"):
         uno.get("period_s")
@@ -208,8 +201,7 @@ def test_a_restart_in_the_middle_of_a_session_is_told():
 
 
 @pytest.mark.slow
-def test_clocks_are_related_within_their_bound():
-    chip, uno = connected()
+def test_clocks_are_related_within_their_bound(chip, uno):
     uno.stream(True)
     errors = []
     for _ in range(5):
@@ -223,8 +215,7 @@ def test_clocks_are_related_within_their_bound():
     assert 0 < uno.clock_relation.bound_s < 0.002
 
 
-def test_a_silent_host_vents_the_robot():
-    chip, uno = connected()
+def test_a_silent_host_vents_the_robot(chip, uno):
     uno.upload({"host_timeout_s": 0.5})
     uno.run()
     for _ in range(20):
@@ -238,8 +229,7 @@ def test_a_silent_host_vents_the_robot():
 
 
 @pytest.mark.soak
-def test_a_thousand_saves(figure):
-    chip, uno = connected()
+def test_a_thousand_saves(chip, uno, figure):
     saved = {}
     for i in range(1000):
         name, period_s = f"p{i % 4}", round(1 + i / 100, 6)

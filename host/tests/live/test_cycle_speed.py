@@ -31,10 +31,11 @@ def until(looks, cycles):
     return [look for look in looks if look[0] < cycles * GAIT.period_s + 0.2]
 
 
-def test_settled_cycles_have_the_speed_of_the_walk_without_its_transient(looks):
+def test_settled_cycles_have_the_speed_of_the_walk_without_its_transient_and_only_the_last_is_kept_in_full(looks):
     speed = seen(looks)
     assert speed.settled == "22.05 mm/s over 6 settled cycles"
     assert speed.mm_s == pytest.approx(22.05, abs=0.15)
+    assert len(speed.path) < 1.2 * 10 * GAIT.period_s
 
 
 def test_nothing_is_said_before_there_are_cycles_enough_and_then_that_they_have_not_settled(looks):
@@ -46,7 +47,3 @@ def test_a_robot_that_stands_and_walks_on_begins_anew(looks):
     speed = seen(looks)
     speed.take(False, *looks[-1])
     assert (speed.settled, speed.mm_s) == ("", None)
-
-
-def test_only_the_last_cycle_is_remembered_look_by_look(looks):
-    assert len(seen(looks).path) < 1.2 * 10 * GAIT.period_s

@@ -23,16 +23,8 @@ PATIENCE_MS = 60_000  # predictions run at the lowest priority
 
 
 @pytest.fixture
-def monitor():
-    started = []
-
-    def start(*options, **where):
-        started.append(WebMonitor(*options, **where))
-        return started[-1]
-
-    yield start
-    for one in started:
-        one.close()
+def monitor(closes):
+    return lambda *options, **where: closes(WebMonitor(*options, **where))
 
 
 @pytest.fixture
@@ -44,12 +36,9 @@ def walking(monitor):
 
 
 @pytest.fixture
-def tab(browser):
-    contexts = []
-
-    def open_tab(url, **options):
-        contexts.append(browser.new_context(viewport={"width": 1280, "height": 900}, **options))
-        page = contexts[-1].new_page()
+def tab(browser, closes):
+    def open_tab(url):
+        page = closes(browser.new_context(viewport={"width": 1280, "height": 900})).new_page()
         page.complaints = []
         page.on("pageerror", lambda error: page.complaints.append(str(error)))
         page.on("console", lambda message: page.complaints.append(message.text))
@@ -57,9 +46,7 @@ def tab(browser):
         page.wait_for_selector("html[data-drawn]", state="attached")
         return page
 
-    yield open_tab
-    for context in contexts:
-        context.close()
+    return open_tab
 
 
 def stop_on(page):
@@ -123,12 +110,11 @@ def test_a_robot_that_is_gone_is_said_and_waited_for_and_never_walks_by_itself(m
     assert second.board.valves == 0
 
 
-def test_a_server_that_ends_while_the_robot_is_gone_leaves_no_page_that_waits_for_it(monitor, tab):
-    bifa = monitor("--run")
-    page = tab(bifa.url)
-    bifa.uno.unplug()
+def test_a_server_that_ends_while_the_robot_is_gone_leaves_no_page_that_waits_for_it(walking, tab):
+    page = tab(walking.url)
+    walking.uno.unplug()
     expect(page.locator("#state")).to_have_text("the link to the robot is lost")
-    bifa.process.kill()
+    walking.process.kill()
     expect(page.locator("#state")).to_have_text("not connected")
     expect(page.locator("#alarm")).to_contain_text("bifa monitor does not answer; the data shown are old.")
     expect(page.locator("#alarm")).to_contain_text("is gone; plug the Uno in again")
@@ -152,25 +138,24 @@ def test_who_ends_it_while_a_robot_that_may_move_is_gone_is_not_told_that_the_va
     page.close()
 
 
-def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(monitor, tab):
-    bifa = monitor("--run")
-    page = tab(bifa.url)
+def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(walking, tab):
+    page = tab(walking.url + "   (Ctrl-C closes it and stops the robot)")  # copied with the rest of its line
     page.get_by_label("When the last page closes").uncheck()
     page.get_by_text("the robot keeps going").wait_for()
     page.close()
     time.sleep(4.5)
-    assert bifa.uno.board.state == "running"
-    page = tab(bifa.url)
+    assert walking.uno.board.state == "running"
+    page = tab(walking.url)
     assert not page.get_by_label("When the last page closes").is_checked()
     page.get_by_label("When the last page closes").check()
     page.get_by_text("the robot stops").last.wait_for()
     page.reload()
     page.wait_for_selector("html[data-drawn]", state="attached")
     time.sleep(4.5)
-    assert bifa.uno.board.state == "running", "a reloaded page does not count as closed"
+    assert walking.uno.board.state == "running", "a reloaded page does not count as closed"
     page.close()
-    assert bifa.until("stopped")
-    assert bifa.uno.board.valves == 0
+    assert walking.until("stopped")
+    assert walking.uno.board.valves == 0
 
 
 def test_who_has_no_token_may_look_and_stop_and_nothing_else(walking, tab):
@@ -219,15 +204,8 @@ def test_a_page_of_an_earlier_server_says_so_and_still_stops(monitor, tab):
     expect(page.get_by_role("button", name="Release the stop")).to_be_enabled()
 
 
-def test_an_address_copied_with_the_rest_of_its_line_is_understood(walking, tab):
-    page = tab(walking.url + "   (Ctrl-C closes it and stops the robot)")
-    page.get_by_label("When the last page closes").uncheck()
-    page.get_by_text("the robot keeps going").wait_for()
-
-
-def test_two_tabs_show_the_same(monitor, tab):
-    bifa = monitor("--run")
-    one, other = tab(bifa.url), tab(bifa.url)
+def test_two_tabs_show_the_same(walking, tab):
+    one, other = tab(walking.url), tab(walking.url)
     expect(other.locator("#predicted")).to_contain_text("10.8", timeout=PATIENCE_MS)
     one.locator("input[name=period_s]").fill("4.5")
     for page in (one, other):
@@ -250,16 +228,17 @@ def test_two_tabs_show_the_same(monitor, tab):
     assert one.complaints + other.complaints == []
 
 
-def test_closing_the_last_page_of_a_robot_that_stands_does_nothing(monitor, tab):
+def test_of_a_robot_that_stands_the_plot_begins_when_the_uno_does_and_closing_the_last_page_does_nothing(monitor, tab):
     bifa = monitor()
     page = tab(bifa.url)
+    assert page.evaluate("Chart.getChart(document.querySelector('#plot canvas')).scales.x.min") >= 0.0
     page.close()
     time.sleep(4.5)
     assert bifa.uno.board.state == "idle"
 
 
-def test_the_page_is_legible_wide_and_narrow_light_and_dark(monitor, tab):
-    page = tab(monitor("--run").url)
+def test_the_page_is_legible_wide_and_narrow_light_and_dark(walking, tab):
+    page = tab(walking.url)
     for width in (1280, 390):
         for scheme in ("light", "dark"):
             page.set_viewport_size({"width": width, "height": 900})
@@ -303,11 +282,6 @@ def test_the_keyboard_alone_sets_a_gait_and_stops(walking, tab):
     page.keyboard.press("Space")
     assert walking.until("stopped")
     assert page.complaints == []
-
-
-def test_what_is_drawn_begins_when_the_uno_does(monitor, tab):
-    page = tab(monitor().url)
-    assert page.evaluate("Chart.getChart(document.querySelector('#plot canvas')).scales.x.min") >= 0.0
 
 
 def test_a_port_that_is_taken_is_refused_with_what_to_do(monitor, uno):

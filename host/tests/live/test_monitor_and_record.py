@@ -3,6 +3,7 @@
 import _thread
 import csv
 import io
+import itertools
 import math
 import re
 import signal
@@ -12,6 +13,7 @@ import time
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 from rich.console import Console
@@ -46,23 +48,23 @@ def test_the_monitor_says_that_the_port_is_gone(uno, tmp_path):
         terminal.sees(f"error: {uno.device} is gone")
 
 
-def test_the_trace_is_as_long_as_it_says():
-    board, shown = Board(), io.StringIO()
-    watch(Uno(board, board), board, Console(file=shown, width=80), 1.0, lambda uno: None)
-    body = next(line for line in shown.getvalue().splitlines() if "body" in line)
-    assert "last 0.9 s" in shown.getvalue()
+def watched(board: Board, begin=lambda uno: None) -> str:
+    """What the monitor shows of a board within a second."""
+    shown = io.StringIO()
+    watch(Uno(board, board), board, Console(file=shown, width=80), 1.0, begin)
+    return shown.getvalue()
+
+
+def test_the_trace_is_as_long_as_it_says(board):
+    shown = watched(board)
+    body = next(line for line in shown.splitlines() if "body" in line)
+    assert "last 0.9 s" in shown
     assert body.count("▄") == 10  # one block, at 0 psi, per 0.1 s
 
 
-def test_the_monitor_shows_which_fault_there_is():
-    board, shown = Board(), io.StringIO()
-
-    def walk_unheard(uno):
-        uno.run()
-        board.sleep(3.0)
-
-    watch(Uno(board, board), board, Console(file=shown, width=80), 1.0, walk_unheard)
-    assert re.search(r"fault  \d\.\d s  host_silent, 2 s, limit 2 s", shown.getvalue())
+def test_the_monitor_shows_which_fault_there_is(board):
+    shown = watched(board, lambda uno: (uno.run(), board.sleep(3.0)))
+    assert re.search(r"fault  \d\.\d s  host_silent, 2 s, limit 2 s", shown)
 
 
 @pytest.mark.parametrize("width", [60, 80, 200])
@@ -115,17 +117,30 @@ def unplugged_then_ended(uno: PtyUno, out: Path, count: int) -> None:
     threading.Thread(target=person, daemon=True).start()
 
 
-def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
-    unos, refusals, told = [PtyUno(), PtyUno()], [RigError("no Uno is plugged in")], io.StringIO()
-    files = [tmp_path / f"out/telemetry_{n}.csv" for n in (1, 2)]
-    opened = []
+@pytest.fixture
+def unos():
+    """Two Unos, one of which is plugged in when the other has gone."""
+    unos = PtyUno(), PtyUno()
+    yield unos
+    for uno in unos:
+        uno.unplug()
+
+
+def opening(*devices: str | RigError):
+    """A function that opens the devices in turn, and raises an error among them."""
+    left = iter(devices)
 
     def open_rig(port) -> SerialRig:
-        if opened and refusals:
-            raise refusals.pop()
-        opened.append(unos[len(opened)])
-        return SerialRig(opened[-1].device)
+        if isinstance(device := next(left), RigError):
+            raise device
+        return SerialRig(device)
 
+    return open_rig
+
+
+def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path, unos):
+    told, files = io.StringIO(), [tmp_path / f"out/telemetry_{n}.csv" for n in (1, 2)]
+    open_rig = opening(unos[0].device, RigError("no Uno is plugged in"), unos[1].device)
     unplugged_then_ended(unos[0], tmp_path / "out", 50)
     record_telemetry(SameBoard("the port", open_rig), tmp_path / "out", None, 120.0, Console(file=told, width=200))
     text = told.getvalue()
@@ -137,7 +152,6 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
         assert len(recorded) >= 50
         assert f"{path}: samples {len(recorded)}  lost {lost(recorded)}  bad frames" in text
     assert unos[1].board.state == "stopped"
-    unos[1].unplug()
 
 
 def test_who_ends_a_recording_while_a_robot_that_may_move_is_gone_is_reminded(uno, gait, tmp_path):
@@ -176,20 +190,14 @@ def test_a_restart_never_walks_and_a_person_is_asked(uno, gait, tmp_path):
     assert uno.board.valves == 0
 
 
-def test_where_nobody_can_be_asked_it_records_without_walking(tmp_path, gait, monkeypatch):
+def test_where_nobody_can_be_asked_it_records_without_walking(tmp_path, gait, unos, monkeypatch):
     monkeypatch.setattr(sys, "stdin", None)
-    unos, told, opened = [PtyUno(), PtyUno()], io.StringIO(), []
-
-    def open_rig(port) -> SerialRig:
-        opened.append(unos[len(opened)])
-        return SerialRig(opened[-1].device)
-
+    told, open_rig = io.StringIO(), opening(*(uno.device for uno in unos))
     unplugged_then_ended(unos[0], tmp_path / "out", 100)
     record_telemetry(SameBoard(None, open_rig), tmp_path / "out", Path(gait), 120.0, Console(file=told, width=200))
     assert unos[0].driven_s > 0
     assert unos[1].driven_s == 0, "a board that is plugged in does not walk by itself"
     assert "recording without walking, since no one can be asked" in told.getvalue()
-    unos[1].unplug()
 
 
 def test_another_uno_is_not_taken_for_the_one_that_was_recorded(monkeypatch):
@@ -208,37 +216,26 @@ def test_another_uno_is_not_taken_for_the_one_that_was_recorded(monkeypatch):
     assert (nameless.open(), nameless.serial_number, nameless.open()) == ("/dev/ttyACM0", None, "/dev/ttyACM0")
 
 
-def test_a_recorder_opens_only_the_board_that_it_began_with(tmp_path, monkeypatch):
+def test_a_recorder_opens_only_the_board_that_it_began_with(board, tmp_path, monkeypatch):
     plugged, opened = [usb("/dev/ttyACM0", "A1")], []
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: plugged)
-    board = Board()
-    monkeypatch.setattr("bifa.live.record.RETRY_S", 0.01)
+    reads, read = itertools.count(), board.read
+
+    def read_until_it_is_gone(timeout_s: float) -> bytes:
+        if next(reads) == 200:
+            board.read = board.write = Mock(side_effect=PortGoneError("gone"))
+        return read(timeout_s)
+
+    board.read = read_until_it_is_gone
+    monkeypatch.setattr("bifa.live.rounds.RETRY_S", 0.01)
 
     def open_once(port):
         opened.append(port)
         plugged[:] = [usb("/dev/ttyACM0", "B2")]
-        return nullcontext(SimpleNamespace(transport=Away(board), clock=board))
+        return nullcontext(SimpleNamespace(transport=board, clock=board))
 
     record_telemetry(SameBoard(None, open_once), tmp_path / "out", None, 3.0, Console(file=io.StringIO()))
     assert opened == [None]
-
-
-class Away:
-    """A board whose port vanishes after 200 reads."""
-
-    def __init__(self, board: Board) -> None:
-        self._board, self._reads = board, 0
-
-    def read(self, timeout_s: float) -> bytes:
-        self._reads += 1
-        if self._reads > 200:
-            raise PortGoneError("gone")
-        return self._board.read(timeout_s)
-
-    def write(self, data: bytes) -> None:
-        if self._reads > 200:
-            raise PortGoneError("gone")
-        self._board.write(data)
 
 
 def usb(device: str, serial_number: str | None) -> SimpleNamespace:

@@ -41,17 +41,9 @@ def port(live):
 
 
 @pytest.fixture
-def page(live, port):
+def page(live, port, closes):
     """A function that opens a page, with the server's token unless another is given."""
-    opened = []
-
-    def open_page(token=live.token, **headers):
-        opened.append(WebSocket(port, token, **headers))
-        return opened[-1]
-
-    yield open_page
-    for one in opened:
-        one.close()
+    return lambda token=live.token, **headers: closes(WebSocket(port, token, **headers))
 
 
 def posted(port: int, name: str, body: str = "", **headers: str) -> int:

@@ -21,18 +21,10 @@ FLOOD_S = 4.0
 
 # What strangers do, each in its own program for FLOOD_S; bounded in time and number of connections.
 FLOODS = {
-    "requests that are never read": """
-        one.sendall(b"GET / HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\n\\r\\n" * 50)
-    """,
-    "connections that say nothing": """
-        pass
-    """,
-    "headers without an end": """
-        one.sendall(b"GET / HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\nX: " + b"x" * 15_000)
-    """,
-    "what is no request": """
-        one.sendall(b"\\x00" * 60_000)
-    """,
+    "requests that are never read": r'one.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 50)',
+    "connections that say nothing": "pass",
+    "headers without an end": r'one.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + b"x" * 15_000)',
+    "what is no request": r'one.sendall(b"\x00" * 60_000)',
     "pages without a token": """
         one.sendall(b"GET /live HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\nUpgrade: websocket\\r\\nConnection: Upgrade\\r\\n"
                     b"Sec-WebSocket-Version: 13\\r\\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\\r\\n\\r\\n")
@@ -58,7 +50,7 @@ class Flood:
     """Two programs that connect to the server as often as they can."""
 
     def __init__(self, port: int, what: str) -> None:
-        code = _FLOOD.format(what=what.strip().replace("\n        ", "\n        "))
+        code = _FLOOD.format(what=what.strip())
         command = [sys.executable, "-c", code, str(port), str(FLOOD_S)]
         self._programs = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(2)]
         for program in self._programs:
@@ -82,10 +74,8 @@ class Watched(PtyUno):
 
 
 @pytest.fixture
-def bifa():
-    started = WebMonitor("--run", uno=Watched())
-    yield started
-    started.close()
+def bifa(closes):
+    return closes(WebMonitor("--run", uno=Watched()))
 
 
 @pytest.mark.parametrize("flood", FLOODS)

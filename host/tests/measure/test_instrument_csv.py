@@ -10,8 +10,6 @@ from typer.testing import CliRunner
 
 from bifa.cli import app
 from bifa.data import DatasetError, read_dataset
-from bifa.data.export import parse_exports
-from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.table import CHAMBERS, MARK_PAUSE
@@ -19,8 +17,7 @@ from bifa.measure.instrument_csv import import_trial, read_instrument
 from bifa.measure.plan import PlannedTrial
 from bifa.rig import open_rig
 from bifa.robot import BASELINE
-from bifa.toml import parse_toml
-from harness.exports import EXPORTS, MACHINES, preset_of
+from harness.exports import MACHINES, declarations, preset_of, write_export
 
 PULL = PlannedTrial("anchor_pull", None, 8.5, 20.0)
 OFFSET_S, DRIFT = 37.2, 4e-5  # instrument = OFFSET_S + (1 + DRIFT) * (Uno's time)
@@ -242,7 +239,7 @@ def test_the_first_edge_after_a_restart_is_sample_1():
             samples += uno.samples(0.1)
         edges = rig.instruments.stop()["sync_time_s"]
         since = edges[np.flatnonzero(np.diff(edges) > 0.015)[-1] + 1 :]
-        stopped_s = rig.clock.now() - uno.clock_relation.offset_s  # on the Uno's clock, within its bound
+        stopped_s = rig.clock.now() - uno.clock_relation.estimate(0.0)  # on the Uno's clock, within its bound
         expected = int(np.floor(stopped_s / 0.01))
         assert samples[0].time_us == samples[0].sequence * 10_000
         assert uno.clock_relation.bound_s < 0.004
@@ -292,8 +289,7 @@ def test_rows_of_a_camera_that_are_missing_are_named_with_file_and_column(files)
 
 
 def declared(text):
-    source = Source(text, 0, "bench.toml")
-    return parse_exports(Fields(parse_toml(text)["instrument"], source, table="instrument"), source)["machine"]
+    return declarations(text)["machine"]
 
 
 def pulled(files):
@@ -305,8 +301,7 @@ def pulled(files):
 def test_an_export_comes_in_by_preset_as_the_data_sets_own_form_does(files, name):
     own, _ = import_trial(files / "pull.csv", files, PULL, files / "own")
     columns, edges = pulled(files)
-    path = files / f"export{EXPORTS[name].suffix}"
-    path.write_bytes(EXPORTS[name].write(columns))
+    path = write_export(files, name, columns)
     write(path.with_suffix(".sync.csv"), {"sync_time_s": edges})
     export = declared(f'[instrument.machine]\npreset = "{preset_of(name)}"\n')
     other, clock = import_trial(path, files, PULL, files / "out", export=export)
@@ -388,8 +383,7 @@ def test_a_strobe_in_a_column_lines_the_record_up(files):
 
 def test_the_command_takes_an_export_as_the_bench_declares_it(files):
     columns, edges = pulled(files)
-    path = files / "pull.TRA"
-    path.write_bytes(EXPORTS["testxpert"].write(columns))
+    path = write_export(files, "testxpert", columns)
     write(path.with_suffix(".sync.csv"), {"sync_time_s": edges})
     (files / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
     options = ["--instrument", str(path), "--telemetry", str(files), "--bench", str(files / "bench.toml")]

@@ -10,11 +10,8 @@ from bifa.rig import SerialRig, open_rig
 from bifa.robot.parameters import ModelParameterError
 
 
-def test_a_serial_port_declares_nothing():
+def test_what_the_person_measured_comes_before_what_the_rig_declares_and_a_serial_port_declares_nothing():
     assert known_of(SerialRig, {}) == {}
-
-
-def test_what_the_person_measured_comes_before_what_the_rig_declares():
     rig = SimpleNamespace(known={"head_mass_kg": 0.175, "tail_mass_kg": 0.175})
     assert known_of(rig, parse_known(["head_mass_kg=0.182"])) == {"head_mass_kg": 0.182, "tail_mass_kg": 0.175}
 

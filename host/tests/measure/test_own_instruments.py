@@ -11,8 +11,8 @@ from bifa.measure import own_instruments
 from bifa.measure.bench_file import read_exports
 from bifa.measure.desk import Desk
 from bifa.measure.instrument_csv import read_instrument
-from bifa.measure.own_instruments import OwnInstruments, Turn
-from bifa.measure.plan import PlannedTrial
+from bifa.measure.own_instruments import OwnInstruments
+from bifa.measure.plan import PlannedTrial, Turn
 from harness.exports import EXPORTS
 from harness.waiting import PATIENCE_S, until
 

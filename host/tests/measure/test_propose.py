@@ -10,17 +10,12 @@ from bifa.data.export import read_export
 from bifa.files import TargetError
 from bifa.measure.bench_file import read_exports
 from bifa.measure.propose import declaration, look, parsed
-from harness.exports import CAMERAS, EXPORTS, MACHINES, preset_of
+from harness.exports import CAMERAS, MACHINES, preset_of, write_export
 
 TIME_S = np.round(np.arange(0.0, 1.0, 0.01), 6)
 MACHINE = {"time_s": TIME_S, "displacement_mm": 20.0 * np.sin(TIME_S) + 0.5, "force_N": -30.0 * np.cos(TIME_S)}
 CAMERA = {"time_s": TIME_S, "displacement_mm": 20.0 * np.sin(TIME_S) + 0.5}
-
-
-def exported(folder, name, role):
-    path = folder / f"trial{EXPORTS[name].suffix}"
-    path.write_bytes(EXPORTS[name].write(MACHINE if role == "machine" else CAMERA))
-    return path
+ACCEPTED = ("y", "", "", "", "", "n", "", "", "n")  # a preset for a machine, its columns and units
 
 
 @pytest.mark.parametrize(
@@ -28,7 +23,7 @@ def exported(folder, name, role):
 )
 def test_how_an_export_is_written_is_seen_without_its_preset(tmp_path, name, role):
     """The form of an export is detected without its preset, and the matching preset is recognised."""
-    path = exported(tmp_path, name, role)
+    path = write_export(tmp_path, name, MACHINE if role == "machine" else CAMERA)
     seen = look(path)
     assert seen.presets[role] == preset_of(name)
     assert len(seen.sheet) == len(TIME_S) * (2 if name == "natnet" else 1)
@@ -42,7 +37,7 @@ def test_how_an_export_is_written_is_seen_without_its_preset(tmp_path, name, rol
 
 @pytest.mark.parametrize("name", ["bluehill", "bluehill-german", "trapezium", "walter-bai", "testxpert"])
 def test_units_and_columns_of_testing_machines_are_proposed(tmp_path, name):
-    seen = look(exported(tmp_path, name, "machine"))
+    seen = look(write_export(tmp_path, name, MACHINE))
     export = parsed("machine", {"preset": name})
     for own, column in export.columns.items():
         assert seen.guess(own) == column
@@ -54,15 +49,21 @@ def asked(path, tmp_path, *answers, role="machine"):
     return CliRunner().invoke(app, options, input="\n".join(answers) + "\n")
 
 
+def told(*given, **role):
+    """What is said while a file is declared by answers to questions."""
+    result = asked(*given, **role)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
 def test_a_file_is_declared_by_answering_questions(tmp_path):
     path = tmp_path / "log.csv"
     rows = "".join(
         f"{1000 * t:.0f};{x:.3f};{f:.4f}\n".replace(".", ",") for t, x, f in zip(*MACHINE.values(), strict=True)
     )
     path.write_text("rig 3\nmillis;pos;cell [kN]\n" + rows)
-    said = asked(path, tmp_path, "", "ms", "pos", "cm", "y", "cell [kN]", "", "n", "file", "y")
-    assert said.exit_code == 0, said.output
-    assert "Read as declared: 100 rows, one every 10 ms." in said.output
+    said = told(path, tmp_path, "", "ms", "pos", "cm", "y", "cell [kN]", "", "n", "file", "y")
+    assert "Read as declared: 100 rows, one every 10 ms." in said
     export = read_exports(tmp_path / "bench.toml")["machine"]
     found, _, _ = read_export(path, export, ("time_s", "displacement_mm", "force_N"))
     np.testing.assert_allclose(found["time_s"], TIME_S)
@@ -73,9 +74,8 @@ def test_a_file_is_declared_by_answering_questions(tmp_path):
 def test_a_signal_in_volts_is_declared_by_its_factor(tmp_path):
     path = tmp_path / "scope.csv"
     path.write_text("Time,Channel A\n(us),(V)\n\n0,1.5\n10,0.25\n20,0.5\n")
-    said = asked(path, tmp_path, "", "", "Channel A", "V", "0", "2.5", "n", "-", "file", "y")
-    assert said.exit_code == 0, said.output
-    assert said.output.count("answer one of mm, m, cm, in, um; or a number, how many mm one of the file's is") == 2
+    said = told(path, tmp_path, "", "", "Channel A", "V", "0", "2.5", "n", "-", "file", "y")
+    assert said.count("answer one of mm, m, cm, in, um; or a number, how many mm one of the file's is") == 2
     found, _, _ = read_export(path, read_exports(tmp_path / "bench.toml")["machine"], ("time_s", "displacement_mm"))
     np.testing.assert_allclose(found["time_s"], [0.0, 1e-5, 2e-5])
     assert found["displacement_mm"].tolist() == [3.75, 0.625, 1.25]
@@ -86,42 +86,35 @@ def test_the_table_of_a_preset_is_shown_though_another_is_longer(tmp_path):
     devices = "Devices\n1000\n,,Plate,,,,\nFrame,Sub Frame,Fx,Fy,Fz,Mx,My\n,,N,N,N,,\n" + "1,0,1,2,3,4,5\n" * 40
     rows = "".join(f"{n},0,{n / 8},2,3\n" for n in range(20))
     path.write_text(f"{devices}\nTrajectories\n100\n,,robot:head,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n{rows}")
-    said = asked(path, tmp_path, "y", "", "", "", "", "", "n", "", "", "n", "", "frames", "y", role="camera")
-    assert said.exit_code == 0, said.output
+    told(path, tmp_path, "y", "", "", "", "", "", "n", "", "", "n", "", "frames", "y", role="camera")
     assert (tmp_path / "bench.toml").read_text() == '[instrument.camera]\npreset = "vicon"\nsync = "frames"\n'
 
 
 def test_a_preset_that_fits_is_offered_and_kept_short(tmp_path):
-    path = exported(tmp_path, "testxpert", "machine")
     (tmp_path / "bench.toml").write_text("[known]\nhead_mass_kg = 0.18\n")
-    said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "file", "y")
-    assert said.exit_code == 0, said.output
-    assert "matches the preset testxpert" in said.output
-    assert "⠐" in said.output or "*" in said.output or "⣀" in said.output, "each column is plotted"
+    said = told(write_export(tmp_path, "testxpert", MACHINE), tmp_path, *ACCEPTED, "file", "y")
+    assert "matches the preset testxpert" in said
+    assert "⠐" in said or "*" in said or "⣀" in said, "each column is plotted"
     text = (tmp_path / "bench.toml").read_text()
     assert text == '[known]\nhead_mass_kg = 0.18\n\n[instrument.machine]\npreset = "testxpert"\n'
 
 
 def test_a_column_that_the_preset_does_not_know_is_proposed_by_its_name(tmp_path):
-    path = exported(tmp_path, "bluehill-german", "machine")
+    path = write_export(tmp_path, "bluehill-german", MACHINE)
     path.write_bytes(path.read_bytes().replace("Verlängerung".encode("cp1252"), b"Traversenweg"))
-    said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "file", "y")
-    assert said.exit_code == 0, said.output
+    told(path, tmp_path, *ACCEPTED, "file", "y")
     assert read_exports(tmp_path / "bench.toml")["machine"].columns["displacement_mm"] == "Traversenweg"
 
 
 def test_the_head_is_not_proposed_as_the_tail_as_well(tmp_path):
     (tmp_path / "a.csv").write_text("t,x,y\n0,1,2\n1,2,3\n")
-    answers = ("", "s", "", "mm", "n", "", "mm", "n", "", "file", "y")
-    said = asked(tmp_path / "a.csv", tmp_path, *answers, role="camera")
-    assert said.exit_code == 0, said.output
+    told(tmp_path / "a.csv", tmp_path, "", "s", "", "mm", "n", "", "mm", "n", "", "file", "y", role="camera")
     assert "displacement_tail_mm" not in read_exports(tmp_path / "bench.toml")["camera"].columns
 
 
 def test_nothing_is_written_unasked_and_nothing_declared_twice(tmp_path):
-    path = exported(tmp_path, "testxpert", "machine")
-    said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "file", "n")
-    assert said.exit_code == 0
+    path = write_export(tmp_path, "testxpert", MACHINE)
+    told(path, tmp_path, *ACCEPTED, "file", "n")
     assert not (tmp_path / "bench.toml").exists()
     (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
     said = asked(path, tmp_path, "y")
@@ -130,15 +123,13 @@ def test_nothing_is_written_unasked_and_nothing_declared_twice(tmp_path):
 
 
 def test_a_strobe_column_that_is_not_there_is_asked_again(tmp_path):
-    path = exported(tmp_path, "testxpert", "machine")
-    said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "D10", "Standardkraft", "3", "y")
-    assert said.exit_code == 0, said.output
-    assert "D10" in said.output
+    path = write_export(tmp_path, "testxpert", MACHINE)
+    assert "D10" in told(path, tmp_path, *ACCEPTED, "D10", "Standardkraft", "3", "y")
     assert read_exports(tmp_path / "bench.toml")["machine"].sync == "Standardkraft"
 
 
 def test_where_a_declaration_cannot_be_written_is_said_before_anything_is_asked(tmp_path):
-    path = exported(tmp_path, "testxpert", "machine")
+    path = write_export(tmp_path, "testxpert", MACHINE)
     for bench in (tmp_path / "nowhere" / "bench.toml", path):
         said = CliRunner().invoke(app, ["instrument", str(path), "--bench", str(bench)])
         assert isinstance(said.exception, TargetError)
@@ -235,8 +226,7 @@ def test_a_workbook_is_looked_at_as_well(tmp_path):
     with pandas.ExcelWriter(tmp_path / "a.xlsx") as book:
         pandas.DataFrame({"of": ["a", "b"], "N": [1.0, 2.0]}).to_excel(book, sheet_name="results", index=False)
         table.to_excel(book, sheet_name="values", index=False, startrow=3)
-    said = asked(tmp_path / "a.xlsx", tmp_path, "", "", "", "", "n", "", "", "n", "file", "y")
-    assert said.exit_code == 0, said.output
+    told(tmp_path / "a.xlsx", tmp_path, "", "", "", "", "n", "", "", "n", "file", "y")
     export = read_exports(tmp_path / "bench.toml")["machine"]
     assert export.form.sheet == "[2]"
     found, _, _ = read_export(tmp_path / "a.xlsx", export, ("time_s", "force_N"))

@@ -15,8 +15,8 @@ from bifa.measure.experiments import STEP_DOWN_S, STEP_UP_S, record_trial
 from bifa.measure.plan import EXPERIMENTS, PlannedTrial, session
 from bifa.measure.recording import Recording, bench_of
 from bifa.measure.session import provenance, run_session
-from bifa.problem.spare import spare
 from bifa.problem.switches import seconds_per_uno_s, valves_of, walk_timeline
+from bifa.problem.system import spare
 from bifa.rig import open_rig
 from bifa.robot.gait import Gait
 from harness.lab import PLAN, PULL, STATIC, WALK
@@ -27,6 +27,16 @@ VALVE_PINS, STROBE_PIN = range(4, 10), 10
 
 def run(rig, folder, trials=PLAN, **more):
     return run_session(rig, folder, trials, **{"name": "a day", "known": {}, "provenance": {"by": "a test"}} | more)
+
+
+def interrupt_in(number, share=0.0):
+    """A listener that interrupts a session in a trial once this share of it is done."""
+
+    def on_event(event):
+        if event.number == number and event.share >= share:
+            raise KeyboardInterrupt
+
+    return on_event
 
 
 @pytest.fixture(scope="module")
@@ -123,13 +133,8 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path):
 @pytest.mark.uno
 def test_an_interrupted_session_goes_on_and_is_never_written_over(rig, tmp_path):
     plan = (STATIC, PULL)
-
-    def interrupt(event):
-        if event.number == 2 and event.share > 0.3:
-            raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        run(rig, tmp_path / "day", plan, on_event=interrupt)
+        run(rig, tmp_path / "day", plan, on_event=interrupt_in(2, 0.3))
     rig.clock.sleep(0.01)
     assert not any(rig.uno.pin(pin) for pin in VALVE_PINS)
     assert len(read_dataset(tmp_path / "day.partial").trials) == 1
@@ -145,13 +150,8 @@ def test_an_interrupted_session_goes_on_and_is_never_written_over(rig, tmp_path)
 def test_a_repeat_recorded_after_an_interruption_is_no_copy_of_the_first(tmp_path):
     """A virtual rig that is opened again would begin with the same noise."""
     plan = (PULL, replace(PULL, repeat=2))
-
-    def interrupt(event):
-        if event.number == 2:
-            raise KeyboardInterrupt
-
     with open_rig("virtual", seed=3) as rig, pytest.raises(KeyboardInterrupt):
-        run(rig, tmp_path / "day", plan, on_event=interrupt)
+        run(rig, tmp_path / "day", plan, on_event=interrupt_in(2))
     with open_rig("virtual", seed=3) as rig:
         one, other = run(rig, tmp_path / "day", plan).trials
     for name in ("displacement_mm", "force_N", "pressure_psi"):
@@ -262,12 +262,8 @@ def test_a_session_is_resumed_with_the_same_settings_only(rig, tmp_path, change)
         made = provenance("bifa experiment", port, options)
         return run(rig, tmp_path / "day", (STATIC, PULL), provenance=made, **more)
 
-    def interrupt(event):
-        if event.number == 2:
-            raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        begin(options, on_event=interrupt)
+        begin(options, on_event=interrupt_in(2))
     if not change:
         assert len(begin(options).trials) == 2
         return

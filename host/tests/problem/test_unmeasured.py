@@ -7,7 +7,7 @@ import pytest
 
 from bifa.identify.start import prepare
 from bifa.problem.accuracy import AccuracyError, accuracies, accuracy_of
-from bifa.problem.spare import spare
+from bifa.problem.system import spare
 from bifa.problem.unmeasured import LOAD_CELL, PRIOR_SD, STAND_MASS
 from harness.independent_lab import BASELINE
 

@@ -18,6 +18,7 @@ pytestmark = pytest.mark.real_time
 
 LOOKS = Path(__file__).with_name("looks.js").read_text(encoding="utf-8")
 WIDE, MIDDLE, NARROW = 1280, 1000, 390
+PLACE = "document.querySelector('.walk0-head').getBoundingClientRect().x"
 _INK = "document.querySelector('.plot').charts[0].options.scales.x.ticks.color"  # color of the plots' text
 
 
@@ -83,22 +84,24 @@ def opened(tabs):
     assert complaints == []
 
 
+@pytest.fixture
+def page(opened):
+    """The campaign's page, wide and light."""
+    return opened("campaign")
+
+
 @pytest.mark.parametrize("name", ["campaign", "compare", "diagnosis", "engine"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [WIDE, MIDDLE, NARROW])
 def test_nothing_overlaps_is_cut_off_or_too_pale(opened, name, width, scheme):
-    page = opened(name, width, scheme)
-    assert page.evaluate(LOOKS) == []
+    assert opened(name, width, scheme).evaluate(LOOKS) == []
 
 
-def test_the_answer_is_on_the_first_screen(opened):
-    page = opened("campaign")
-    bottom = page.evaluate("document.querySelector('nav').getBoundingClientRect().bottom")
-    assert bottom <= 900
+def test_the_answer_is_on_the_first_screen(page):
+    assert page.evaluate("document.querySelector('nav').getBoundingClientRect().bottom") <= 900
 
 
-def test_a_name_above_a_plot_hides_and_shows_its_curves(opened):
-    page = opened("campaign")
+def test_a_name_above_a_plot_hides_and_shows_its_curves(page):
     figure = page.locator("figure.chart", has_text="measured").first
 
     def curves() -> int:
@@ -116,9 +119,9 @@ def test_a_name_above_a_plot_hides_and_shows_its_curves(opened):
     assert curves() == before
 
 
-def test_a_plot_zooms_and_comes_back_and_its_column_follows(opened):
-    page = opened("campaign")
-    plot = page.locator(".plot").nth(_column_of_panels(page))
+def test_a_plot_zooms_and_comes_back_and_its_column_follows(page):
+    several = page.evaluate("[...document.querySelectorAll('.plot')].findIndex((box) => box.charts.length > 1)")
+    plot = page.locator(".plot").nth(several)
     plot.scroll_into_view_if_needed()
     reach = "box => box.charts.map(({ scales: { x } }) => [x.min, x.max])"
     whole = plot.evaluate(reach)
@@ -137,13 +140,7 @@ def test_a_plot_zooms_and_comes_back_and_its_column_follows(opened):
     page.wait_for_function(back, arg=both)
 
 
-def _column_of_panels(page) -> int:
-    """Index of the first plot with several panels above one another."""
-    return page.evaluate("[...document.querySelectorAll('.plot')].findIndex((box) => box.charts.length > 1)")
-
-
-def test_a_plot_says_under_the_pointer_what_is_there(opened):
-    page = opened("campaign")
+def test_a_plot_says_under_the_pointer_what_is_there(page):
     plot = page.locator(".plot").last
     plot.scroll_into_view_if_needed()
     spot = plot.locator("canvas").bounding_box()
@@ -153,8 +150,7 @@ def test_a_plot_says_under_the_pointer_what_is_there(opened):
     page.wait_for_function("box => box.charts[0].tooltip.body?.[0]?.lines[0].startsWith('baseline')", arg=handle)
 
 
-def test_the_plots_follow_the_reader_s_scheme(opened):
-    page = opened("campaign")
+def test_the_plots_follow_the_reader_s_scheme(page):
     light = page.evaluate(_INK)
     page.emulate_media(color_scheme="dark")
     page.wait_for_function(f"{_INK} !== {light!r}")
@@ -166,27 +162,24 @@ def test_pages_with_plots_stay_under_a_megabyte(pages):
         assert page.stat().st_size < 1e6, page.name
 
 
-def test_the_animation_runs_pauses_and_is_set_by_its_slider(opened):
-    page = opened("campaign")
+def test_the_animation_runs_pauses_and_is_set_by_its_slider(page):
     figure = page.locator(".motion")
-    place = "document.querySelector('.walk0-head').getBoundingClientRect().x"
-    before = page.evaluate(place)
-    page.wait_for_function(f"Math.abs({place} - {before}) > 2")
+    before = page.evaluate(PLACE)
+    page.wait_for_function(f"Math.abs({PLACE} - {before}) > 2")
     figure.get_by_role("button", name="Pause").click()
     page.wait_for_timeout(100)
-    still = page.evaluate(place)
+    still = page.evaluate(PLACE)
     page.wait_for_timeout(300)
-    assert page.evaluate(place) == still
+    assert page.evaluate(PLACE) == still
     slider = figure.locator("input")
     slider.fill("10")
-    assert page.evaluate(place) != still
+    assert page.evaluate(PLACE) != still
     assert figure.locator("output").inner_text() == "10.0 s"
     slider.press("ArrowRight")
     assert figure.locator("output").inner_text() == "10.1 s"
 
 
-def test_the_clock_of_the_animation_tells_the_time_at_its_dot(opened):
-    page = opened("campaign")
+def test_the_clock_of_the_animation_tells_the_time_at_its_dot(page):
     figure = page.locator(".motion")
     shown = float(figure.get_attribute("data-shown"))
     assert shown > 1.5 * float(figure.get_attribute("data-seconds")), "the walk is shown faster than real time"
@@ -209,12 +202,11 @@ def test_the_animation_stands_still_for_who_prefers_that(opened):
     page = opened("campaign", motion="reduce")
     page.reload()
     page.wait_for_selector("html[data-drawn]", state="attached")
-    place = "document.querySelector('.walk0-head').getBoundingClientRect().x"
-    before = page.evaluate(place)
+    before = page.evaluate(PLACE)
     page.wait_for_timeout(400)
-    assert page.evaluate(place) == before
+    assert page.evaluate(PLACE) == before
     page.locator(".motion").get_by_role("button", name="Play").click()
-    page.wait_for_function(f"Math.abs({place} - {before}) > 2")
+    page.wait_for_function(f"Math.abs({PLACE} - {before}) > 2")
 
 
 def test_on_paper_nothing_is_cut_off_and_no_table_is_split(opened, tmp_path):

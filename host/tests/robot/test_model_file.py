@@ -16,47 +16,19 @@ from bifa.simulate import walk
 from bifa.toml import parse_toml
 from harness.tampered import tampered
 
-_LEARNT = "[learnt.{}]\nlower = 0.0\nupper = 1.0\nvalues = {}\n[stiffness.body]"
-CHANGED = {
-    "other format": ("format = 1", "format = 2", "format 2"),
-    "unknown parameter": ("[parameters.mu_k]", "[parameters.mu_q]", "mu_q"),
-    "out of range": ("value = 0.175", "value = 17.5", r"head_mass_kg.*0\.02 to 1"),
-    "not a number": ("value = 0.175", 'value = "heavy"', "head_mass_kg"),
-    "not finite": ("value = 0.175", "value = nan", "head_mass_kg"),
-    "wrong unit": ('unit = "N/psi"', 'unit = "N/bar"', "N/bar"),
-    "unknown effect": ("[stiffness.body]", "[effects.magic]\nsize = 1.0\n[stiffness.body]", "magic"),
-    "no such learnt curve": ("[stiffness.body]", _LEARNT.format("magic", "[[0.0, 1.0]]"), "magic"),
-    "learnt rows": ("[stiffness.body]", _LEARNT.format("filling", "[[0.0, 1.0]]"), "1 rows instead of 2"),
-    "learnt values": ("[stiffness.body]", _LEARNT.format("body_damper", '[["a", 1.0]]'), "rows"),
-    "learnt, uneven": ("[stiffness.body]", _LEARNT.format("filling", "[[0.0, 1.0], [0.0]]"), "rows"),
-    "learnt, no number": ("[stiffness.body]", _LEARNT.format("body_damper", f"[[0.0, 1{400 * '0'}]]"), "rows"),
-    "learnt, unbounded": (
-        "[stiffness.body]",
-        _LEARNT.format("body_damper", "[[0.0, 1.0]]").replace("1.0\n", "inf\n"),
-        "lower < upper",
-    ),
-    "in millimetres": (
-        "lower_m = -0.006",
-        "lower_m = -6.0",
-        r"stiffness.body.lower_m = -6.0 is outside its range -1 to 1 m",
-    ),
-    "text for a number": (
-        "lower_m = -0.006",
-        'lower_m = "-0.006"',
-        "stiffness.body.lower_m = '-0.006' is not a number",
-    ),
-    "no float": ("-139.2774809279526", f"1{400 * '0'}", "stiffness.body must hold numbers"),
-    "named twice": (
-        "[stiffness.body]",
-        '[covariance]\nnames = ["mu_k", "mu_k"]\nmatrix = [[1, 0], [0, 1]]\n[stiffness.body]',
-        "twice",
-    ),
-    "not TOML": ("format = 1", "format = ", "TOML"),
-    "not bistable": ("-139.2774809279526", "1e9", "bistable"),
-    "no finite curve": ("-139.2774809279526", "nan", "2 to 16 finite coefficients"),
-    "no covariance": ("[stiffness.body]", '[covariance]\nnames = ["a"]\nmatrix = [[1, 2]]\n[stiffness.body]', "1 x 1"),
+_LEARNT = "[learnt.{}]\nlower = 0.0\nupper = 1.0\nvalues = {}"
+INSERTED = {
+    "unknown effect": ("[effects.magic]\nsize = 1.0", "magic"),
+    "no such learnt curve": (_LEARNT.format("magic", "[[0.0, 1.0]]"), "magic"),
+    "learnt rows": (_LEARNT.format("filling", "[[0.0, 1.0]]"), "1 rows instead of 2"),
+    "learnt values": (_LEARNT.format("body_damper", '[["a", 1.0]]'), "rows"),
+    "learnt, uneven": (_LEARNT.format("filling", "[[0.0, 1.0], [0.0]]"), "rows"),
+    "learnt, no number": (_LEARNT.format("body_damper", f"[[0.0, 1{400 * '0'}]]"), "rows"),
+    "learnt, unbounded": (_LEARNT.format("body_damper", "[[0.0, 1.0]]").replace("1.0\n", "inf\n"), "lower < upper"),
+    "named twice": ('[covariance]\nnames = ["mu_k", "mu_k"]\nmatrix = [[1, 0], [0, 1]]', "twice"),
+    "no covariance": ('[covariance]\nnames = ["a"]\nmatrix = [[1, 2]]', "1 x 1"),
 } | {
-    f"scatter, {line}": ("[stiffness.body]", f"[scatter]\n{line}\n[stiffness.body]", "scatter")
+    f"scatter, {line}": (f"[scatter]\n{line}", "scatter")
     for line in (
         "friction = -0.1",
         'friction = "much"',
@@ -67,6 +39,21 @@ CHANGED = {
         "wind = 1.0",
     )
 }
+LOWER = "stiffness.body.lower_m = "
+CHANGED = {
+    "other format": ("format = 1", "format = 2", "format 2"),
+    "unknown parameter": ("[parameters.mu_k]", "[parameters.mu_q]", "mu_q"),
+    "out of range": ("value = 0.175", "value = 17.5", r"head_mass_kg.*0\.02 to 1"),
+    "not a number": ("value = 0.175", 'value = "heavy"', "head_mass_kg"),
+    "not finite": ("value = 0.175", "value = nan", "head_mass_kg"),
+    "wrong unit": ('unit = "N/psi"', 'unit = "N/bar"', "N/bar"),
+    "in millimetres": ("lower_m = -0.006", "lower_m = -6.0", LOWER + "-6.0 is outside its range -1 to 1 m"),
+    "text for a number": ("lower_m = -0.006", 'lower_m = "-0.006"', LOWER + "'-0.006' is not a number"),
+    "no float": ("-139.2774809279526", f"1{400 * '0'}", "stiffness.body must hold numbers"),
+    "not TOML": ("format = 1", "format = ", "TOML"),
+    "not bistable": ("-139.2774809279526", "1e9", "bistable"),
+    "no finite curve": ("-139.2774809279526", "nan", "2 to 16 finite coefficients"),
+} | {name: ("[stiffness.body]", f"{text}\n[stiffness.body]", told) for name, (text, told) in INSERTED.items()}
 
 
 def test_round_trip_keeps_every_number(tmp_path):

@@ -132,8 +132,9 @@ def test_a_small_effect_is_a_small_change(name, base):
         assert np.abs(changed[channel] - base["step_response"][f"0:{channel}"]).max() < 0.1, channel
 
 
-def test_every_effect_of_the_contract_is_there_and_declared():
+def test_every_effect_of_the_contract_is_there_and_declared_with_the_experiments_of_data_sets():
     assert set(effects.library()) >= NAMED
+    assert set(EXPERIMENTS) == set(data_layout.EXPERIMENTS)
     for name, effect in effects.library().items():
         assert effect.name == name
         assert effect.equation
@@ -166,13 +167,19 @@ def test_a_wrong_effect_is_refused_by_name_and_range(chosen, told):
         robot.nominal().with_effects(chosen)
 
 
+_SIZE = EffectParameter("share", "", 0.0, 1.0, 0.1, "size", size=True)
+
+
+def swelling(name="swelling", experiments=(), parameters=(_SIZE,), **told):
+    return PhysicalEffect(name, "", "F (1 + share)", "a test", "eq. (2)", experiments, parameters, **told)
+
+
 @pytest.fixture
 def with_new_effect(monkeypatch):
     """The library with one more file in it; the flat layout follows."""
 
     module = types.ModuleType("bifa.effects.swelling")
-    parameter = EffectParameter("share", "", 0.0, 1.0, 0.1, "size", size=True)
-    module.EFFECT = PhysicalEffect("swelling", "", "F (1 + share)", "a test", "eq. (2)", (), (parameter,))
+    module.EFFECT = swelling()
 
     def add(**functions):
         vars(module).update(functions)
@@ -226,27 +233,26 @@ def test_a_parameter_that_would_hide_what_the_hook_offers_is_refused(with_new_ef
         with_new_effect(reading=lambda share, pressure_psi: pressure_psi * share)
 
 
-_SIZE = EffectParameter("share", "", 0.0, 1.0, 0.1, "size", size=True)
-
-
 @pytest.mark.parametrize(
     ("file", "declared", "told"),
     [
-        ("swelling", None, r"swelling\.py must define EFFECT"),
-        ("swelling", ("leak", _SIZE), r"swelling\.py must define EFFECT = PhysicalEffect\(name='swelling'"),
-        ("swelling-2", ("swelling-2", _SIZE), "a name without hyphens"),
+        ("swelling", {}, r"swelling\.py must define EFFECT"),
         (
             "swelling",
-            ("swelling", replace(_SIZE, size=False)),
+            {"EFFECT": swelling("leak")},
+            r"swelling\.py must define EFFECT = PhysicalEffect\(name='swelling'",
+        ),
+        ("swelling-2", {"EFFECT": swelling("swelling-2")}, "a name without hyphens"),
+        (
+            "swelling",
+            {"EFFECT": swelling(parameters=(replace(_SIZE, size=False),))},
             "swelling does not act: no parameter is marked size=True",
         ),
     ],
 )
 def test_a_file_that_is_no_effect_of_its_name_is_refused(file, declared, told, monkeypatch):
     module = types.ModuleType(file)
-    if declared:
-        name, parameter = declared
-        module.EFFECT = PhysicalEffect(name, "", "F (1 + share)", "a test", "eq. (2)", (), (parameter,))
+    vars(module).update(declared)
     monkeypatch.setattr(effects, "modules", lambda: {file: module})
     with pytest.raises(EffectError, match=told):
         effects.library.__wrapped__()
@@ -261,17 +267,12 @@ def test_a_file_that_is_no_effect_of_its_name_is_refused(file, declared, told, m
     ],
 )
 def test_a_declaration_that_would_keep_an_effect_from_being_tried_is_refused(wrong, told):
-    right = {"experiments": EXPERIMENTS, "parameters": (_SIZE,)}
     with pytest.raises(EffectError, match=told):
-        PhysicalEffect("swelling", "", "F (1 + share)", "a test", "eq. (2)", **right | wrong)
-
-
-def test_effects_name_the_experiments_of_data_sets():
-    assert set(EXPERIMENTS) == set(data_layout.EXPERIMENTS)
+        swelling(**{"experiments": EXPERIMENTS} | wrong)
 
 
 def test_a_tuple_of_one_needs_no_comma():
-    effect = PhysicalEffect("swelling", "", "F (1 + share)", "a test", "eq. (2)", "locomotion", _SIZE)
+    effect = swelling(experiments="locomotion", parameters=_SIZE)
     assert effect.experiments == ("locomotion",)
     assert effect.sizes == (_SIZE,)
 

@@ -1,4 +1,4 @@
-"""Timelines of commands: from gaits, from phases, from records."""
+"""Timelines of commands: from gaits, from records."""
 
 import numpy as np
 import pytest
@@ -16,16 +16,13 @@ def test_settled_switching_is_the_thresholds(gait):
     line = simulate.of_gait(gait, 20.0)
     time = np.arange(0.0005, 20.0, 0.0137)
     phases = 2 * np.pi * time[:, None] / gait.period_s + cpg.phase_offsets_rad(gait)
-    expected = np.array([cpg.outputs(phase, gait) for phase in phases])
-    np.testing.assert_array_equal(line.at(time), expected)
+    np.testing.assert_array_equal(line.at(time), np.mod(phases, 2 * np.pi) > 2 * np.pi * cpg.duties(gait))
 
 
-def test_settled_phases_of_the_oscillators_switch_alike():
-    gait = GAITS[0]
-    settled = simulate.of_gait(gait, 10.0)
-    integrated = simulate.of_phases(gait, 10.0, cpg.phase_offsets_rad(gait))
-    np.testing.assert_array_equal(integrated.command, settled.command)
-    np.testing.assert_allclose(integrated.time_s, settled.time_s, atol=1.1e-3)
+def test_duty_is_the_vacuum_fraction():
+    gait = Gait(4.0, 90.0, 180.0, 0.2, 0.5, 0.8)
+    positive = simulate.of_gait(gait, 5.0).at(np.linspace(0, 4.0, 4001)[:-1]).mean(axis=0)
+    np.testing.assert_allclose(positive, [0.8, 0.5, 0.2], atol=2e-3)
 
 
 @pytest.mark.parametrize("clock", [1.0, 1.004])

@@ -26,16 +26,22 @@ def program() -> Callable[[Path, str], Path]:
 
 
 @pytest.fixture
-def programs(program, tmp_path, monkeypatch) -> Path:
+def only_path(tmp_path, monkeypatch) -> Path:
+    """An empty folder, alone on PATH."""
+    folder = tmp_path / "programs"
+    folder.mkdir()
+    monkeypatch.setenv("PATH", str(folder))
+    return folder
+
+
+@pytest.fixture
+def programs(program, only_path) -> Path:
     """A folder, alone on PATH, with an empty program for every tool of the AVR tool chain."""
     from provision.system import AVR_TOOLS
 
-    folder = tmp_path / "programs"
-    folder.mkdir()
     for name in (*(f"avr-{tool}" for tool in AVR_TOOLS), "avrdude", "simavr"):
-        program(folder / name, "")
-    monkeypatch.setenv("PATH", str(folder))
-    return folder
+        program(only_path / name, "")
+    return only_path
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import io
 import tarfile
 
 import pytest
-from provision import debian_source, unity
+from provision import unity
 from provision.debian_source import fetch_source, source_entries
 from provision.errors import ProvisionError
 
@@ -65,15 +65,16 @@ def test_entries_become_source_entries_and_a_disabled_file_is_left_alone(apt, fi
     assert source_entries(apt).splitlines() == entries
 
 
-def test_no_archive_at_all_is_said(apt, tmp_path):
-    with pytest.raises(ProvisionError, match="names no Debian archive"):
+@pytest.mark.parametrize(("text", "told"), [("", "names no Debian archive"), (ONE_LINE, "apt-get is not on PATH")])
+def test_a_machine_without_an_archive_or_without_apt_is_told_so(apt, only_path, tmp_path, text, told):
+    (apt / "sources.list").write_text(text)
+    with pytest.raises(ProvisionError, match=told):
         fetch_source("cjson", tmp_path / "scratch", apt)
 
 
-def test_apt_gets_only_private_folders_and_its_complaint_is_passed_on(apt, program, tmp_path, monkeypatch):
-    (apt / "sources.list").write_text("deb http://archive.example/debian stable main\n")
-    program(tmp_path / "apt-get", f'echo "$@" >> {tmp_path}/calls\necho "E: no such archive" >&2\nexit 100')
-    monkeypatch.setenv("PATH", str(tmp_path))
+def test_apt_gets_only_private_folders_and_its_complaint_is_passed_on(apt, program, only_path, tmp_path):
+    (apt / "sources.list").write_text(ONE_LINE)
+    program(only_path / "apt-get", f'echo "$@" >> {tmp_path}/calls\necho "E: no such archive" >&2\nexit 100')
     scratch = tmp_path / "scratch"
     with pytest.raises(ProvisionError, match="could not fetch the source package cjson: E: no such archive"):
         fetch_source("cjson", scratch, apt)
@@ -81,13 +82,6 @@ def test_apt_gets_only_private_folders_and_its_complaint_is_passed_on(apt, progr
     for option in ("Dir::Etc::SourceList", "Dir::State::Lists", "Dir::Cache"):
         assert f"{option}={scratch}" in call
     assert "Dir::Etc::SourceParts=-" in call
-
-
-def test_a_machine_without_apt_is_told_so(apt, tmp_path, monkeypatch):
-    (apt / "sources.list").write_text("deb http://archive.example/debian stable main\n")
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ProvisionError, match="apt-get is not on PATH"):
-        debian_source.fetch_source("cjson", tmp_path / "scratch", apt)
 
 
 def archive(path, names, text="x"):

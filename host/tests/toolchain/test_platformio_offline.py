@@ -51,28 +51,10 @@ def pio(project: Path, *words: str) -> subprocess.CompletedProcess:
     return subprocess.run([PIO, *words], cwd=project, env=environment, capture_output=True, text=True, check=False)
 
 
-@pytest.fixture
-def upload(small_project, program, tmp_path):
-    """A function that uploads with a stand-in for avrdude and returns its arguments, with {port} for the port."""
+def test_the_image_builds_and_after_a_full_clean_the_upload_builds_it_again(small_project, program, tmp_path):
     avrdude = own_stand_ins(small_project) / "packages" / "tool-avrdude" / "bin" / "avrdude"
     avrdude.unlink()
     program(avrdude, f'echo "$@" > {tmp_path}/call')
-
-    def run() -> str:
-        host_end, board_end = pty.openpty()
-        try:
-            port = os.ttyname(board_end)
-            done = pio(small_project, "run", "-e", "uno", "-t", "upload", "--upload-port", port)
-        finally:
-            os.close(host_end)
-            os.close(board_end)
-        assert done.returncode == 0, done.stderr
-        return (tmp_path / "call").read_text().replace(port, "{port}")
-
-    return run
-
-
-def test_the_image_builds_and_after_a_full_clean_the_upload_builds_it_again(small_project, upload):
     image = small_project / ".pio" / "build" / "uno" / "firmware.elf"
     built = pio(small_project, "run", "-e", "uno")
     assert built.returncode == 0, built.stderr
@@ -80,9 +62,17 @@ def test_the_image_builds_and_after_a_full_clean_the_upload_builds_it_again(smal
     assert image.with_suffix(".hex").is_file()
     assert pio(small_project, "run", "-e", "uno", "-t", "fullclean").returncode == 0
     assert not image.is_file()
-    call = upload()
+    host_end, board_end = pty.openpty()
+    try:
+        port = os.ttyname(board_end)
+        uploaded = pio(small_project, "run", "-e", "uno", "-t", "upload", "--upload-port", port)
+    finally:
+        os.close(host_end)
+        os.close(board_end)
+    assert uploaded.returncode == 0, uploaded.stderr
     assert image.is_file()
-    assert call.startswith("-p atmega328p -c arduino -D -b 115200 -P {port} -U flash:w:")
+    call = (tmp_path / "call").read_text()
+    assert call.startswith(f"-p atmega328p -c arduino -D -b 115200 -P {port} -U flash:w:")
     assert "firmware.hex:i" in call
 
 

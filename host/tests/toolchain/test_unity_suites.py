@@ -17,21 +17,21 @@ def report(*suites):
     }
 
 
-def test_passed_suites_are_proven():
-    assert (
-        unproven(report(("native", "test_cpg", "PASSED", "now"), ("uno", "test_cpg", "SKIPPED", None)), "native") == []
-    )
+PASSED, NOT_RUN = ("native", "test_a", "PASSED", "now"), ("native", "test_c", "SKIPPED", None)
+ELSEWHERE = ("uno", "test_a", "SKIPPED", "now")
 
 
-def test_a_silent_suite_is_named():
-    found = unproven(report(("simavr", "test_a", "PASSED", "now"), ("simavr", "test_b", "SKIPPED", "now")), "simavr")
-    assert found == ["suite test_b printed no result"]
-
-
-def test_no_suite_at_all_is_an_error():
-    assert unproven(report(("uno", "test_cpg", "SKIPPED", None)), "native") == [
-        "no suite was run in environment native"
-    ]
+@pytest.mark.parametrize(
+    ("suites", "told"),
+    [
+        ([PASSED, NOT_RUN, ELSEWHERE], []),
+        ([PASSED, ("native", "test_b", "SKIPPED", "now")], ["suite test_b printed no result"]),
+        ([NOT_RUN, ELSEWHERE], ["no suite was run in environment native"]),
+    ],
+    ids=["passed", "silent", "none"],
+)
+def test_a_suite_that_printed_nothing_is_named_and_none_at_all_is_an_error(suites, told):
+    assert unproven(report(*suites), "native") == told
 
 
 def test_a_hanging_chip_is_stopped_with_all_its_processes(tmp_path):
@@ -63,13 +63,10 @@ UNDEFINED = """lib/cpg/sine.h:22:31: runtime error: signed integer overflow: 1 +
 """
 
 
-def test_what_a_sanitizer_found_is_named_with_its_place():
+def test_what_a_sanitizer_found_is_named_with_its_place_and_without_one_it_is_still_told():
     assert finding(ADDRESS) == (
         "AddressSanitizer: global-buffer-overflow in bifa::flash_byte(void const*) lib/flash/flash.h:30"
     )
     assert finding(UNDEFINED).startswith("signed integer overflow: 1 + 1 cannot be represented in")
     assert "lib/cpg/sine.h:22" in finding(UNDEFINED)
-
-
-def test_a_report_without_a_place_is_still_told():
     assert finding("garbage") == "a sanitizer stopped a suite in an unknown place"

@@ -49,16 +49,15 @@ def image(tmp_path: Path) -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def board(image: Callable[[str], Path]) -> Iterator[Callable[..., Uno]]:
-    made: list[Uno] = []
+def board(image: Callable[[str], Path], closes) -> Callable[..., Uno]:
+    """board(source, run_s): a chip with this program, after `run_s`."""
 
-    def build(source: str, **options: object) -> Uno:
-        made.append(Uno(image(source), **options))
-        return made[-1]
+    def build(source: str, run_s: float = 0.0, **options: object) -> Uno:
+        uno = closes(Uno(image(source), **options))
+        uno.run_for(run_s)
+        return uno
 
-    yield build
-    for uno in made:
-        uno.close()
+    return build
 
 
 @pytest.fixture

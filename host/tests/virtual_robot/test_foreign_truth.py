@@ -34,10 +34,8 @@ def walk(robot: dict, cycles: int = 2, **trial) -> np.ndarray:
 
 def step(robot: dict, chamber: str = "body", end_s: float = 8.0, **trial) -> np.ndarray:
     edges = [Edge(0.4, chamber, "positive"), Edge(4.0, chamber, "vacuum")]
-    times = np.arange(round(end_s * 100) + 1) / 100
-    return run(
-        robot, {"experiment": "step_response", "chamber": chamber, "start": "vacuum", **trial}, edges, times
-    ).rows
+    trial = {"experiment": "step_response", "chamber": chamber, "start": "vacuum", **trial}
+    return run(robot, trial, edges, np.arange(round(end_s * 100) + 1) / 100).rows
 
 
 # --- physics ----------------------------------------------------------------------------------------------------

@@ -19,16 +19,15 @@ def walk(gait: Gait, cycles: int, parameters=NOMINAL, step_s: float | None = Non
     return plant.record(np.arange(round(cycles * gait.period_s * 100) + 1) / 100)
 
 
-def settled_speed_mm_s(rows: np.ndarray, gait: Gait, cycles: int) -> float:
+def settled_speed_mm_s(gait: Gait, cycles: int, parameters=NOMINAL) -> float:
+    rows = walk(gait, cycles, parameters)
     x = np.interp(np.array([cycles - 3, cycles]) * gait.period_s, rows["time_s"], rows["head_m"])
     return 1e3 * float(x[1] - x[0]) / (3 * gait.period_s)
 
 
 def test_the_baseline_walks_as_in_the_paper_and_the_other_gait_twice_as_fast():
-    baseline = settled_speed_mm_s(walk(BASELINE, 6), BASELINE, 6)
-    robust = settled_speed_mm_s(walk(ROBUST, 10), ROBUST, 10)
-    assert baseline == pytest.approx(10.8, abs=0.1)
-    assert robust == pytest.approx(21.9, abs=0.2)
+    assert settled_speed_mm_s(BASELINE, 6) == pytest.approx(10.8, abs=0.1)
+    assert settled_speed_mm_s(ROBUST, 10) == pytest.approx(21.9, abs=0.2)
 
 
 def test_the_step_is_far_finer_than_the_noise():
@@ -133,9 +132,7 @@ CHANNELS = {"head_m": 1e-4, "tail_m": 1e-4, "force_N": 0.15, "pressure_psi": 0.0
 
 
 def test_a_worn_robot_walks_too_and_its_air_is_compressible():
-    slow = Gait(8.0, 270.0, 90.0, 0.5, 0.5, 0.5)
-    rows = walk(slow, 4, profile("worn"))
-    assert settled_speed_mm_s(rows, slow, 4) > 3.0
+    assert settled_speed_mm_s(Gait(8.0, 270.0, 90.0, 0.5, 0.5, 0.5), 4, profile("worn")) > 3.0
 
 
 def test_unknown_names_are_refused():

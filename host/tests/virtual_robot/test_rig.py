@@ -39,16 +39,13 @@ BODY_UP, BODY_DOWN, HEAD_UP, ALL_OFF = b"\x01", b"\x02", b"\x04", b"\x00"
 
 
 @pytest.fixture
-def bench(image):
-    made = []
+def bench(image, closes):
+    return lambda **options: closes(open_rig(firmware=image(BENCH), **options))
 
-    def build(**options):
-        made.append(open_rig(firmware=image(BENCH), **options))
-        return made[-1]
 
-    yield build
-    for rig in made:
-        rig.close()
+@pytest.fixture
+def rig(bench):
+    return bench()
 
 
 def psi(rig, after_s: float) -> np.ndarray:
@@ -62,8 +59,7 @@ def psi(rig, after_s: float) -> np.ndarray:
     return ((counts + 0.5) / 1024 - 0.1) * 30 / 0.8 - 15
 
 
-def test_time_passes_only_in_read_and_sleep(bench):
-    rig = bench()
+def test_time_passes_only_in_read_and_sleep(rig):
     assert rig.clock.now() == 0.0
     rig.transport.write(ALL_OFF)
     assert rig.clock.now() == 0.0
@@ -73,8 +69,7 @@ def test_time_passes_only_in_read_and_sleep(bench):
     assert rig.clock.now() == pytest.approx(0.25, abs=1e-6)
 
 
-def test_a_read_waits_for_the_first_byte_and_no_longer(bench):
-    rig = bench()
+def test_a_read_waits_for_the_first_byte_and_no_longer(rig):
     rig.clock.sleep(0.1)
     rig.transport.read(0.0)
     before = rig.clock.now()
@@ -85,8 +80,7 @@ def test_a_read_waits_for_the_first_byte_and_no_longer(bench):
         rig.transport.read(0.1)
 
 
-def test_waiting_for_a_fraction_of_a_cycle_gets_there(bench):
-    rig = bench()
+def test_waiting_for_a_fraction_of_a_cycle_gets_there(rig):
     end = rig.clock.now() + 0.01
     reads = 0
     while rig.clock.now() < end:
@@ -95,8 +89,7 @@ def test_waiting_for_a_fraction_of_a_cycle_gets_there(bench):
     assert reads < 10
 
 
-def test_valves_fill_chambers_and_sensors_tell(bench):
-    rig = bench()
+def test_valves_fill_chambers_and_sensors_tell(rig):
     assert psi(rig, 0.05) == pytest.approx([0, 0, 0], abs=0.3)
     rig.transport.write(BODY_UP)
     assert psi(rig, 3.0) == pytest.approx([8.5, 0, 0], abs=0.3)
@@ -107,15 +100,13 @@ def test_valves_fill_chambers_and_sensors_tell(bench):
     assert rig.plant.both_valves == 0
 
 
-def test_both_valves_of_a_chamber_are_counted(bench):
-    rig = bench()
+def test_both_valves_of_a_chamber_are_counted(rig):
     rig.transport.write(b"\x03")
     rig.clock.sleep(0.01)
     assert rig.plant.both_valves == 1
 
 
-def test_a_broken_sensor_and_its_repair(bench):
-    rig = bench()
+def test_a_broken_sensor_and_its_repair(rig):
     rig.break_sensor("head", 0.0)
     assert psi(rig, 0.1)[1] < -18
     rig.break_sensor("head", None)
@@ -159,8 +150,7 @@ def test_a_camera_runs_on_its_own_clock_and_the_strobe_lines_it_up(bench):
     assert record["displacement_mm"][-1] > 50
 
 
-def test_a_static_loading_moves_there_and_back_when_told(bench):
-    rig = bench()
+def test_a_static_loading_moves_there_and_back_when_told(rig):
     rig.instruments.mount("static_loading", actuator="small", rate_mm_s=20.0)
     rig.instruments.start()
     rig.clock.sleep(0.5)
@@ -179,8 +169,7 @@ def test_a_static_loading_moves_there_and_back_when_told(bench):
     assert np.diff(record["time_s"]) == pytest.approx(0.02, abs=1e-9)
 
 
-def test_an_anchored_head_holds_and_then_slides(bench):
-    rig = bench()
+def test_an_anchored_head_holds_and_then_slides(rig):
     rig.instruments.mount("anchor_pull", rate_mm_s=20.0)
     rig.transport.write(HEAD_UP)
     rig.clock.sleep(4.0)
@@ -192,8 +181,8 @@ def test_an_anchored_head_holds_and_then_slides(bench):
     assert force[-1] == pytest.approx(force.max() * 0.38 / 0.45, abs=1.5)
 
 
-def test_what_the_stand_cannot_do_is_said(bench):
-    instruments = bench().instruments
+def test_what_the_stand_cannot_do_is_said(rig):
+    instruments = rig.instruments
     with pytest.raises(StandError, match="no experiment 'flying'"):
         instruments.mount("flying")
     with pytest.raises(StandError, match='"large" or "small"'):

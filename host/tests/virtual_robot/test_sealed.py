@@ -1,4 +1,5 @@
-"""Sealed data sets: format, sealing, determinism, and that only the label reveals the effects."""
+"""Sealed data sets: format, sealing, determinism, and that only the label reveals the effects; computed, and measured
+through the firmware (the realistic truth)."""
 
 import tomllib
 
@@ -6,8 +7,12 @@ import numpy as np
 import pytest
 
 from bifa.data import read_dataset
+from bifa.measure.plan import PlannedTrial
+from harness import sealed_campaign
 from virtual_robot import sealed
 from virtual_robot.effects import LIBRARY, OUTSIDE
+from virtual_robot.instruments.sensors import Noise, measured
+from virtual_robot.plant import NOMINAL, profile
 from virtual_robot.sealed import SealedError, draw_effects, generate, main
 
 CONTRACT = {
@@ -69,3 +74,37 @@ def test_nothing_is_overwritten_and_nothing_half_written(tmp_path, monkeypatch, 
     assert sorted(p.name for p in tmp_path.iterdir()) == ["there"]
     with pytest.raises(SealedError, match="no effect 'magic'"):
         generate(1, tmp_path / "new", effect="magic")
+
+
+PLAN = (PlannedTrial("step_response", "small", 8.5),)
+
+
+@pytest.mark.uno
+def test_a_sealed_robot_is_measured_and_its_data_say_nothing_of_what_is_in_it(tmp_path):
+    sealed_campaign.generate(5, tmp_path / "day", effect="leak", size=0.5, trials=PLAN)
+    data = read_dataset(tmp_path / "day")
+    assert [trial.experiment for trial in data.trials] == ["step_response"]
+    assert "leak" not in (tmp_path / "day" / "dataset.toml").read_text()
+    sealed = tomllib.loads((tmp_path / "day.sealed.toml").read_text())
+    assert sealed["sizes"] == {"leak": pytest.approx(0.5)}
+    assert sealed["truth"] == "realistic"
+    assert sealed["parameters"]["leak_rate_per_s"] == pytest.approx(0.025)
+
+
+def test_unknown_effects_are_named(tmp_path, capsys):
+    assert sealed_campaign.main(["--seed", "1", "--out", str(tmp_path / "day"), "--effect", "magic"]) == 2
+    assert "no effect 'magic'; there are hysteresis" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_realistic_robot_without_an_effect_has_none():
+    assert profile("realistic") == NOMINAL
+    assert profile("worn") != NOMINAL
+
+
+def test_realistic_noise_is_colored_and_ideal_noise_is_white():
+    for memory_s, expected in ((0.0, 0.0), (0.008, np.exp(-0.01 / 0.008))):
+        noise = Noise(memory_s=memory_s)
+        seen = measured(np.zeros(40000), noise.camera_m, np.random.default_rng(1), noise.correlation(0.01))
+        assert seen.std() == pytest.approx(noise.camera_m, rel=0.03)
+        assert np.corrcoef(seen[1:], seen[:-1])[0, 1] == pytest.approx(expected, abs=0.02)

@@ -14,7 +14,7 @@ from bifa import robot, simulate
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
 from bifa.robot.stiffness import StiffnessCurve
-from bifa.simulate.timeline import COMMANDS
+from bifa.simulate.stepper import OFF, POSITIVE, VACUUM
 from virtual_robot.effects import EFFECTS, LIBRARY, plant_parameters
 from virtual_robot.gait import BASELINE, EASY
 from virtual_robot.instruments.sensors import Noise
@@ -23,6 +23,7 @@ from virtual_robot.trials import Lab, Plan
 
 pytestmark = pytest.mark.slow
 
+COMMANDS = {"positive": POSITIVE, "vacuum": VACUUM, "off": OFF}
 NOISE = {"force_N": 0.15, "displacement": 0.1, "pressure": 0.06}
 PLANS = (
     Plan("static_loading", "static", "body", 4.0, 0.008),

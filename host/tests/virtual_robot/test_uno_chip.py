@@ -25,8 +25,7 @@ def pin_edges(uno, pin):
 
 
 def test_timer_edges_are_16000_cycles_apart_and_the_chip_sleeps_between(board):
-    uno = board(TICK)
-    uno.run_for(0.1)
+    uno = board(TICK, run_s=0.1)
     rises = [cycle for cycle, level in pin_edges(uno, 4) if level]
     assert len(rises) in (99, 100)
     assert {b - a for a, b in itertools.pairwise(rises)} == {16000}
@@ -70,8 +69,7 @@ int main(void) { PORTD = 0x04; DDRD = 0x10; EICRA = 2; EIMSK = 1; sei(); for (;;
 
 
 def test_pins_fall_when_a_reset_lets_go_of_them(board):
-    uno = board("int main(void) { DDRD |= 0xF0; PORTD |= 0x50; for (;;) {} }")
-    uno.run_for(0.001)
+    uno = board("int main(void) { DDRD |= 0xF0; PORTD |= 0x50; for (;;) {} }", run_s=0.001)
     assert [uno.pin(p) for p in (4, 5, 6, 7)] == [1, 0, 1, 0]
     uno.reset("external")
     assert uno.pin(4) is None
@@ -80,8 +78,7 @@ def test_pins_fall_when_a_reset_lets_go_of_them(board):
 
 
 def test_a_pin_falls_when_its_direction_is_cleared(board):
-    uno = board("int main(void) { PORTB = 1; DDRB = 1; _delay_us(100); DDRB = 0; for (;;) {} }")
-    uno.run_for(0.001)
+    uno = board("int main(void) { PORTB = 1; DDRB = 1; _delay_us(100); DDRB = 0; for (;;) {} }", run_s=0.001)
     (up, _), (down, level) = pin_edges(uno, 8)
     assert level == 0
     assert 1600 <= down - up <= 1620
@@ -92,8 +89,7 @@ def test_reset_causes_collect_until_cleared(board):
 static uint8_t seen __attribute__((used, section(".noinit")));
 int main(void) { seen = MCUSR; MCUSR = 0; for (;;) {} }
 """
-    uno = board(source)
-    uno.run_for(0.001)
+    uno = board(source, run_s=0.001)
     assert uno.peek("seen") == b"\x01"
     for cause, flag in (("external", 2), ("brown-out", 4)):
         uno.reset(cause)
@@ -150,8 +146,7 @@ int main(void) { _delay_ms(1); deep(); for (;;) {} }
 
 
 def test_without_power_time_passes_and_nothing_runs(board):
-    uno = board(TICK)
-    uno.run_for(0.01)
+    uno = board(TICK, run_s=0.01)
     uno.power_off()
     count = uno.event_count
     uno.run_for(0.01)
@@ -166,8 +161,7 @@ def test_without_power_time_passes_and_nothing_runs(board):
 
 
 def test_an_event_keeps_its_number_when_the_log_drops_older_ones(board):
-    uno = board("int main(void) { DDRD = 0x10; for (;;) PIND = 0x10; }")
-    uno.run_for(0.2)
+    uno = board("int main(void) { DDRD = 0x10; for (;;) PIND = 0x10; }", run_s=0.2)
     first = uno.event_count
     (last_seen,) = uno.iter_events(first - 1)
     uno.run_for(0.1)

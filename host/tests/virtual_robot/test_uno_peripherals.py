@@ -16,8 +16,7 @@ int main(void) { serial(); UCSR0B |= 0x80; sei(); set_sleep_mode(SLEEP_MODE_IDLE
 
 
 def test_a_byte_takes_ten_bits_each_way(board):
-    uno = board(ECHO)
-    uno.run_for(0.001)
+    uno = board(ECHO, run_s=0.001)
     start = uno.cycle
     uno.send(b"abc")
     uno.run_for(0.001)
@@ -30,8 +29,7 @@ def test_a_byte_takes_ten_bits_each_way(board):
 
 
 def test_a_run_can_stop_at_the_first_byte(board):
-    uno = board(ECHO)
-    uno.run_for(0.001)
+    uno = board(ECHO, run_s=0.001)
     uno.send(b"a")
     start = uno.cycle
     assert uno.run_until(start + CLOCK_HZ, stop_on_output=True)
@@ -56,8 +54,7 @@ int main(void) {
 
 
 def test_the_wrong_baud_rate_garbles(board):
-    uno = board(ECHO)
-    uno.run_for(0.001)
+    uno = board(ECHO, run_s=0.001)
     uno.send(b"hello", baud=115_200)
     uno.run_for(0.01)
     assert uno.receive() != b"ifmmp"
@@ -111,8 +108,7 @@ static void dac(uint8_t address, uint16_t code) {
 
 
 def test_the_dac_takes_fast_writes_at_the_bus_speed(board):
-    uno = board(TWI + "int main(void) { serial(); TWBR = 12; dac(0x62, 268); for (;;) {} }")
-    uno.run_for(0.01)
+    uno = board(TWI + "int main(void) { serial(); TWBR = 12; dac(0x62, 268); for (;;) {} }", run_s=0.01)
     assert uno.receive() == bytes((0x08, 0x18, 0x28, 0x28))
     assert uno.dac_code == 268
     (event,) = [e for e in uno.events if e.kind == "dac"]
@@ -121,19 +117,13 @@ def test_the_dac_takes_fast_writes_at_the_bus_speed(board):
     assert uno.dac_eeprom_writes == 0
 
 
-def test_an_absent_dac_is_not_acknowledged(board):
-    uno = board(TWI + "int main(void) { serial(); TWBR = 72; _delay_ms(1); dac(0x62, 5); for (;;) {} }")
-    uno.set_bus("absent")
-    uno.run_for(0.01)
-    assert uno.receive() == bytes((0x08, 0x20, 0x30, 0x30))
-    assert uno.dac_code == 0
-
-
-def test_a_stuck_bus_never_answers(board):
+@pytest.mark.parametrize(("bus", "answer"), [("absent", b"\x08\x20\x30\x30x"), ("stuck", b"")])
+def test_an_absent_dac_is_not_acknowledged_and_a_stuck_bus_never_answers(board, bus, answer):
     uno = board(TWI + "int main(void) { serial(); TWBR = 72; _delay_ms(1); dac(0x62, 5); put('x'); for (;;) {} }")
-    uno.set_bus("stuck")
+    uno.set_bus(bus)
     uno.run_for(0.05)
-    assert uno.receive() == b""
+    assert uno.receive() == answer
+    assert uno.dac_code == 0
 
 
 def test_the_dac_keeps_its_output_through_a_reset_but_not_without_power(board):
@@ -164,14 +154,12 @@ int main(void) {
 
 def test_eeprom_writes_take_their_time_and_last(board, tmp_path):
     store = tmp_path / "eeprom.bin"
-    uno = board(EEPROM, eeprom=store)
-    uno.run_for(0.05)
+    uno = board(EEPROM, eeprom=store, run_s=0.05)
     (_, first), (done, byte) = uno.receive_stamped()
     assert (first, byte) == (0xFF, ord("D"))
     assert 4 * 3.4e-3 < done / CLOCK_HZ < 4 * 3.4e-3 + 2e-4
     uno.close()
-    again = board(EEPROM, eeprom=store)
-    again.run_for(0.001)
+    again = board(EEPROM, eeprom=store, run_s=0.001)
     assert again.receive()[:1] == b"0"
 
 

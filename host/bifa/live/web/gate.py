@@ -5,6 +5,7 @@ that every newcomer is served: a stop needs no token. All of this runs in the se
 """
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -24,25 +25,8 @@ class Gate:
     def __init__(self) -> None:
         self.strangers: dict[asyncio.Transport, asyncio.TimerHandle] = {}  # oldest first
 
-        class Http(H11Protocol):
-            def connection_made(http, transport: Any) -> None:  # noqa: N805
-                super().connection_made(transport)
-                self._enter(http)
-
-            def connection_lost(http, error: Exception | None) -> None:  # noqa: N805
-                self._forget(http.transport)
-                super().connection_lost(error)
-
-        class Websocket(WSProtocol):
-            def connection_made(websocket, transport: Any) -> None:  # noqa: N805
-                super().connection_made(transport)
-                self._keep_open(transport)
-
-            def connection_lost(websocket, error: Exception | None) -> None:  # noqa: N805
-                self._forget(websocket.transport)
-                super().connection_lost(error)
-
-        self.http, self.websocket = Http, Websocket
+        self.http = _observed(H11Protocol, self._enter, self._forget)
+        self.websocket = _observed(WSProtocol, self._keep_open, self._forget)
 
     def prove(self, client: tuple[str, int]) -> None:
         """Record that the connection from `client` has shown the token."""
@@ -63,8 +47,8 @@ class Gate:
             left_s = ANSWERED_WITHIN_S - HEADERS_WITHIN_S
             self.strangers[transport] = asyncio.get_running_loop().call_later(left_s, self._end, transport)
 
-    def _keep_open(self, transport: asyncio.Transport) -> None:
-        if timer := self.strangers.get(transport):
+    def _keep_open(self, websocket: WSProtocol) -> None:
+        if timer := self.strangers.get(websocket.transport):
             timer.cancel()
 
     def _end(self, transport: asyncio.Transport) -> None:
@@ -74,3 +58,18 @@ class Gate:
     def _forget(self, transport: asyncio.Transport) -> None:
         if timer := self.strangers.pop(transport, None):
             timer.cancel()
+
+
+def _observed(protocol: Any, on_made: Callable[[Any], None], on_lost: Callable[[asyncio.Transport], None]) -> Any:
+    """Derive from a protocol of uvicorn one that tells when its connection is made or lost."""
+
+    class Observed(protocol):  # type: ignore[misc]
+        def connection_made(self, transport: Any) -> None:
+            super().connection_made(transport)
+            on_made(self)
+
+        def connection_lost(self, error: Exception | None) -> None:
+            on_lost(self.transport)
+            super().connection_lost(error)
+
+    return Observed

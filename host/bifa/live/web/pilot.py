@@ -16,7 +16,8 @@ from bifa.errors import BifaError
 from bifa.link import Clock, LinkError, RefusedError, Sample, StillMovingError, Uno
 from bifa.link.table import CHAMBERS
 from bifa.live.cycle_speed import CycleSpeed
-from bifa.live.rounds import Latest, Pace
+from bifa.live.rounds import Absence, Latest, Pace
+from bifa.rig import SameBoard
 
 REPORT_S = 0.1
 MAX_REQUESTS = 16
@@ -24,6 +25,9 @@ MOVING = ("running", "holding")
 _LOOK_S = 0.02  # longest time that a request waits for the robot's samples
 _EVERY_NTH = 5  # every fifth sample is shown: 20 a second
 _BETWEEN_STOPS_S = 0.02  # so that repeated stops leave room on the line for the answer
+
+_WAITING = "waiting for the Uno, since a page is open; it will not walk by itself (Ctrl-C ends)"
+_CAME_BACK = "the link to the Uno was lost and is back; it does not walk by itself"
 
 Tell = Callable[[dict[str, Any], list[dict[str, Any]]], None]
 
@@ -112,7 +116,7 @@ class Pilot:
                 future.set_exception(NotConnectedError(self._ended))
             elif self._stop is None:
                 self._stop = future
-                self.stopped = _requested_stop(by)
+                self.stopped = _stop_record(by=by)
         for one in dropped:
             one.cancel()
         return future
@@ -161,10 +165,10 @@ class Pilot:
     def _take_off(self, came_back: str) -> None:
         with self._lock:
             self._is_flying = True
-            self.stopped = _spontaneous_stop(came_back) if came_back else None
+            self.stopped = _stop_record(why=came_back) if came_back else None
             if self._stopped_early and not came_back:
                 self._stop = Future()
-                self.stopped = _requested_stop(self._stopped_early)
+                self.stopped = _stop_record(by=self._stopped_early)
             self._stopped_early = ""
             self._ended = "bifa monitor has ended; the robot was stopped"
 
@@ -212,17 +216,11 @@ class Pilot:
                 self._stop = None
                 self.stopped = {**(self.stopped or {}), "is_confirmed": confirmed, "at": wall_clock()}
 
-    def stopped_by_itself(self, why: str) -> None:
-        """Record that the robot stopped without a request from here."""
+    def note_stopped(self, stopped: dict[str, Any] | None) -> None:
+        """Record that the robot stopped without a request from here, or (None) that it moves again."""
         with self._lock:
             if self._stop is None:
-                self.stopped = _spontaneous_stop(why)
-
-    def clear_stopped(self) -> None:
-        """Record that the robot moves again after an earlier stop."""
-        with self._lock:
-            if self._stop is None:
-                self.stopped = None
+                self.stopped = stopped
 
 
 class _Flight:
@@ -286,9 +284,9 @@ class _Flight:
         state = self._latest.sample.state if self._latest.sample else ""
         if state != self._state:
             if self._state in MOVING and state not in MOVING and self._pilot.stopped is None:
-                self._pilot.stopped_by_itself(self._uno.status().why_stopped)
+                self._pilot.note_stopped(_stop_record(why=self._uno.status().why_stopped))
             elif state in MOVING:
-                self._pilot.clear_stopped()
+                self._pilot.note_stopped(None)
             self._state = state
         if self._settings["is_pending"]:
             self._read_settings()
@@ -304,7 +302,9 @@ class _Flight:
             **self._settings,
         }
         if newest := self._latest.sample:
-            report |= {"robot": newest.state, "uno_s": newest.time_us / 1e6, "chambers": _chambers(newest)}
+            seen = zip(CHAMBERS, newest.pressure_psi, newest.connected, newest.phase_rad, strict=True)
+            chambers = {name: {"psi": psi, "valves": valves, "phase_rad": phase} for name, psi, valves, phase in seen}
+            report |= {"robot": newest.state, "uno_s": newest.time_us / 1e6, "chambers": chambers}
             if self._position_mm is not None:
                 ends_mm = self._position_mm()
                 is_seen = all(map(math.isfinite, ends_mm.values()))  # a marker may be lost; JSON has no NaN
@@ -317,17 +317,9 @@ class _Flight:
         return report, shown
 
 
-def _requested_stop(by: str) -> dict[str, Any]:
-    return {"by": by, "at": wall_clock(), "is_confirmed": None, "why": ""}
-
-
-def _spontaneous_stop(why: str) -> dict[str, Any]:
-    return {"by": "", "at": wall_clock(), "is_confirmed": True, "why": why}
-
-
-def _chambers(sample: Sample) -> dict[str, dict[str, Any]]:
-    seen = zip(CHAMBERS, sample.pressure_psi, sample.connected, sample.phase_rad, strict=True)
-    return {name: {"psi": psi, "valves": valves, "phase_rad": phase} for name, psi, valves, phase in seen}
+def _stop_record(*, by: str = "", why: str = "") -> dict[str, Any]:
+    """What pages show of a stop: requested `by` someone and not yet confirmed, or without a request, `why`."""
+    return {"by": by, "at": wall_clock(), "is_confirmed": None if by else True, "why": why}
 
 
 def _shown(sample: Sample) -> dict[str, Any]:
@@ -337,3 +329,45 @@ def _shown(sample: Sample) -> dict[str, Any]:
 def wall_clock() -> str:
     """The time of day, to show when a stop was confirmed."""
     return time.strftime("%H:%M:%S")
+
+
+def fly(
+    pilot: Pilot,
+    board: SameBoard,
+    tell: Tell,
+    say: Callable[[str], None],
+    duration_s: float | None,
+    begin: Callable[[Uno, bool], None],
+) -> None:
+    """Fly until Ctrl-C or for `duration_s`; while somebody watches the page, wait for a lost robot to return, as `bifa
+    record` does. `begin(uno, is_back)` begins each flight; a robot that is back never walks by itself.
+
+    say: prints on the terminal what has gone wrong. Raises the error that ended a flight if nobody watches the pages.
+    Ends with StillMovingError if a stop was not confirmed and the robot has not come back since.
+    """
+    end_s = math.inf if duration_s is None else time.monotonic() + duration_s
+    told: list[str] = []
+
+    def take_off(uno: Uno) -> None:
+        absence.unconfirmed = None
+        begin(uno, bool(told))
+
+    def tell_once(error: Exception) -> None:
+        if str(error) not in told[-1:]:
+            told.append(str(error))
+            say(f"{error}\n{_WAITING}")
+
+    absence = Absence(pilot.is_watched, tell_once)
+    try:
+        while (left_s := end_s - time.monotonic()) > 0:
+            with absence.waited_out(), board.open() as rig:
+                position_mm = getattr(rig.instruments, "position_mm", None)
+                length_s = None if left_s == math.inf else left_s
+                uno, came_back = Uno(rig.transport, rig.clock), _CAME_BACK if told else ""
+                pilot.fly(uno, rig.clock, tell, length_s, take_off, position_mm, came_back)
+                return
+    except KeyboardInterrupt:
+        if absence.unconfirmed is None:
+            raise
+    if absence.unconfirmed is not None:
+        raise absence.unconfirmed

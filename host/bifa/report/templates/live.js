@@ -10,6 +10,7 @@
   const sliders = [...document.querySelectorAll("input[type=range]")];
   const chambers = [...document.querySelectorAll("[data-chamber]")].map((row) => row.dataset.chamber);
   const SHOWN_S = 20, LEVEL = { vacuum: 0, off: 0.5, positive: 1, both: 1 };
+  const SILENT = "bifa monitor does not answer; it may have ended";
   const OLD = "bifa monitor does not answer; the data shown are old.";
   const STALE = "This page belongs to an earlier bifa monitor: open the address that the terminal shows now. Stop still works here.";
   // write only changes: screen readers would announce unchanged text ten times a second
@@ -21,7 +22,7 @@
   const say = (text, wrong = false) => { tell(said, text); said.classList.toggle("wrong", wrong); };
   const isOpen = () => socket && socket.readyState === WebSocket.OPEN;
   const request = (name, body = {}) => new Promise((resolve, reject) => {
-    if (!isOpen()) { reject(new Error("bifa monitor does not answer; it may have ended")); return; }
+    if (!isOpen()) { reject(new Error(SILENT)); return; }
     number += 1;
     waiting.set(number, { resolve, reject });
     socket.send(JSON.stringify({ id: number, do: name, ...body }));
@@ -38,7 +39,7 @@
   const stopByRequest = async () => {
     let answer;
     try { answer = await (await fetch("/stop", { method: "POST", keepalive: true })).json(); }
-    catch { throw new Error("bifa monitor does not answer; it may have ended"); }
+    catch { throw new Error(SILENT); }
     if (answer.error) throw new Error(answer.error);
     return answer.said;
   };
@@ -227,7 +228,7 @@
     fresh = true;
   };
   const lost = () => {
-    for (const waits of waiting.values()) waits.reject(new Error("bifa monitor does not answer; it may have ended"));
+    for (const waits of waiting.values()) waits.reject(new Error(SILENT));
     waiting.clear();
     tell(state, "not connected");
     tell(clock, "");

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from bifa.simulate import actuator, layout, learnt, locomotion, march, stand, stepper, together
+from bifa.simulate import actuator, compiled, layout, learnt, locomotion, march, stand, stepper
 from bifa.simulate.hooks import chains
 from bifa.simulate.lanes.translate import Intrinsic, Shapes, Translator, UntranslatableError
 
@@ -41,10 +41,10 @@ _SHAPES = Shapes(
 _INTRINSICS: dict[Any, Intrinsic] = {
     actuator.reach: Intrinsic("reach_of({0})", ("F", "F", "F")),
     actuator.cubic: Intrinsic("row_of({0}, {1})", ("F", "F", "F", "F")),
-    together.worst: Intrinsic("worst({m}, {0}, {1})", "F"),
-    together.least: Intrinsic("least({m}, {0}, {1})", "F"),
-    together.anyone: Intrinsic("anyone({m}, {0}, {1})", "B"),
-    together.anywhere: Intrinsic("any({0})", "b"),
+    compiled.worst: Intrinsic("worst({m}, {0}, {1})", "F"),
+    compiled.least: Intrinsic("least({m}, {0}, {1})", "F"),
+    compiled.anyone: Intrinsic("anyone({m}, {0}, {1})", "B"),
+    compiled.anywhere: Intrinsic("any({0})", "b"),
 }
 _BENCH = ("Plant", "Mounting", "Run")
 # The functions that drive.c calls: name there, function, kinds of its arguments, whether it always runs in all lanes.

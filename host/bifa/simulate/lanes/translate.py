@@ -20,7 +20,8 @@ import builtins
 import inspect
 import math
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,8 @@ C_TYPES = {"f": "double", "i": "long", "b": "int", "F": "V", "B": "Mask", "f[]":
 _UNROLLED = 16  # most iterations of a loop that is unrolled
 _SAME_IN_ALL = ("f", "i", "b")
 _COMPARISONS = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
+_HOLDING = (("bi", "i"), ("bif", "f"), ("bB", "B"), ("bifF", "F"))  # kinds, and the least that can hold them all
+_SELECT = {"F": "sel", "B": "sel_mask"}  # for the kinds that differ between lanes
 _SIGNS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 # Names in C's <math.h>, and in vectors.h with a leading "v_".
@@ -296,18 +299,17 @@ class _Body:
                 array, array_kind = self._value(target.value)
                 at, size = self._fresh("i"), self._size(target, array, array_kind)
                 self._emit(f"for (long {at} = 0; {at} < {size}; {at}++)")
-                self._emit(f"  {self._kept(f'{array}[{at}]', _as(code, kind, 'F'))};")
+                self._assign(f"{array}[{at}]", _as(code, kind, "F"), "F", indent="  ")
             case ast.Subscript():
-                place = self._place(target)
-                self._emit(f"{self._kept(place, _as(code, kind, 'F'))};")
+                self._assign(self._place(target), _as(code, kind, "F"), "F")
             case _:
                 raise self._no(target, "has an unsupported assignment target")
 
-    def _kept(self, place: str, code: str, select: str = "sel") -> str:
-        """Code of an assignment in the lanes of the region."""
-        if self.region.full:
-            return f"{place} = {code}"
-        return f"{place} = {select}({self.region.mask}, {code}, {place})"
+    def _assign(self, place: str, code: str, kind: Kind, everywhere: bool = False, indent: str = "") -> None:
+        """Assign in the lanes of the region, or `everywhere`."""
+        if kind in _SELECT and not (everywhere or self.region.full):
+            code = f"{_SELECT[kind]}({self.region.mask}, {code}, {place})"
+        self._emit(f"{indent}{place} = {code};")
 
     def _store_name(self, node: ast.AST, name: str, code: str, kind: Kind) -> None:
         if isinstance(kind, tuple):
@@ -323,13 +325,7 @@ class _Body:
         if joined is None:
             raise self._no(node, f"assigns a {kind} to {name}, which was a {known}")
         self.kinds[name] = joined
-        code = _as(code, kind, joined)
-        if joined == "F":
-            self._emit(f"{self._kept('x_' + name, code)};")
-        elif joined == "B":
-            self._emit(f"{self._kept('x_' + name, code, 'sel_mask')};")
-        else:
-            self._emit(f"x_{name} = {code};")
+        self._assign(f"x_{name}", _as(code, kind, joined), joined)
 
     def _do_return(self, node: ast.Return) -> None:
         parts = [] if node.value is None else self._returned_parts(node.value)
@@ -337,12 +333,7 @@ class _Body:
             self._remember_result(node, parts)
         plain = self.region.mask == "m" and self.region.loop is None
         for i, ((code, kind), joined) in enumerate(zip(parts, self.returned or (), strict=False)):
-            code = _as(code, kind, joined)
-            if joined in ("F", "B") and not (plain and not self.assigned_result):
-                select = "sel" if joined == "F" else "sel_mask"
-                self._emit(f"{self._kept(f'ret{i}', code, select)};")
-            else:
-                self._emit(f"ret{i} = {code};")
+            self._assign(f"ret{i}", _as(code, kind, joined), joined, everywhere=plain and not self.assigned_result)
         self.assigned_result = self.assigned_result or not plain
         if plain:
             self._emit("return@")
@@ -386,43 +377,37 @@ class _Body:
             return
         condition = self._fresh("c")
         self._emit(f"const Mask {condition} = {truth};")
-        jumped = self.jumped
-        self.jumped = False
-        outer = self.region
-        for statements, mask in ((node.body, "and_"), (node.orelse, "andnot")):
-            if not statements:
-                continue
-            name = self._fresh("m")
-            self._emit("{")
-            self._emit(f"Mask {name} = {mask}({condition}, {outer.mask});")
-            self._emit(f"if (any({name})) {{")
-            self.region = _Region(name, False, outer.loop)
-            self._block(statements)
-            self._emit("} }")
-        self.region = outer
-        if self.jumped:
-            self._take_out(outer)
-        self.jumped = jumped or self.jumped
+        with self._inside() as outer:
+            for statements, mask in ((node.body, "and_"), (node.orelse, "andnot")):
+                if not statements:
+                    continue
+                name = self._fresh("m")
+                self._emit("{")
+                self._emit(f"Mask {name} = {mask}({condition}, {outer.mask});")
+                self._emit(f"if (any({name})) {{")
+                self.region = _Region(name, False, outer.loop)
+                self._block(statements)
+                self._emit("} }")
 
     def _uniform(self, statements: Sequence[ast.stmt]) -> None:
         """Translate a branch that either all lanes of the region take, or none."""
-        outer = self.region
-        self.region = _Region(outer.mask, outer.full, outer.loop)
-        jumped, self.jumped = self.jumped, False
-        self._block(statements)
-        outer.full = outer.full and self.region.full
+        with self._inside() as outer:
+            self.region = _Region(outer.mask, outer.full, outer.loop)
+            self._block(statements)
+            outer.full = outer.full and self.region.full
+
+    @contextmanager
+    def _inside(self) -> Iterator[_Region]:
+        """Translate regions inside the present one. Afterwards the lanes that have meanwhile left the function, the
+        loop or its present iteration are removed from its mask."""
+        outer, jumped, self.jumped = self.region, self.jumped, False
+        yield outer
         self.region = outer
         if self.jumped:
-            self._take_out(outer)
+            lost = f"or_(gone, or_({outer.loop.left}, {outer.loop.skipped}))" if outer.loop else "gone"
+            self._emit(f"{outer.mask} = andnot({lost}, {outer.mask});")
+            outer.full = False
         self.jumped = jumped or self.jumped
-
-    def _take_out(self, region: _Region) -> None:
-        """Remove the lanes that have left the function, the loop or its present iteration from the mask."""
-        lost = "gone"
-        if region.loop:
-            lost = f"or_(gone, or_({region.loop.left}, {region.loop.skipped}))"
-        self._emit(f"{region.mask} = andnot({lost}, {region.mask});")
-        region.full = False
 
     def _do_for(self, node: ast.For) -> None:
         match node.iter:
@@ -451,37 +436,27 @@ class _Body:
             self._block(node.body)
             self._emit("}")
             return
-        outer = self.region
         loop = _Loop(self._fresh("left"), self._fresh("skipped"))
         mask = self._fresh("m")
-        self._emit(f"Mask {loop.left} = no_lanes();")
-        self._emit(f"for ({name} = 0; {name} < {end}; {name}++) {{")
-        self._emit(f"Mask {loop.skipped} = no_lanes();")
-        self._emit(f"Mask {mask} = andnot(or_(gone, {loop.left}), {outer.mask});")
-        self._emit(f"if (!any({mask})) break;")
-        self.region = _Region(mask, False, loop)
-        jumped, self.jumped = self.jumped, False
-        self._block(node.body)
-        self._emit(f"(void){mask}; }}")
-        self.region = outer
-        if any(isinstance(part, ast.Return) for part in ast.walk(node)):
-            self._take_out(outer)
-            self.jumped = True
-        else:
-            self.jumped = jumped
+        with self._inside() as outer:
+            self._emit(f"Mask {loop.left} = no_lanes();")
+            self._emit(f"for ({name} = 0; {name} < {end}; {name}++) {{")
+            self._emit(f"Mask {loop.skipped} = no_lanes();")
+            self._emit(f"Mask {mask} = andnot(or_(gone, {loop.left}), {outer.mask});")
+            self._emit(f"if (!any({mask})) break;")
+            self.region = _Region(mask, False, loop)
+            self._block(node.body)
+            self._emit(f"(void){mask}; }}")
+            self.jumped = any(isinstance(part, ast.Return) for part in ast.walk(node))  # all others stay in the loop
 
-    def _do_break(self, node: ast.Break) -> None:
-        self._leave(node, "left")
-
-    def _do_continue(self, node: ast.Continue) -> None:
-        self._leave(node, "skipped")
-
-    def _leave(self, node: ast.stmt, which: str) -> None:
-        if self.region.loop is None:
+    def _do_break(self, node: ast.Break | ast.Continue) -> None:
+        if (loop := self.region.loop) is None:
             raise self._no(node, "uses break or continue outside a loop over a range")
-        lanes = getattr(self.region.loop, which)
+        lanes = loop.left if isinstance(node, ast.Break) else loop.skipped
         self._emit(f"{lanes} = or_({lanes}, {self.region.mask});")
         self.jumped = True
+
+    _do_continue = _do_break
 
     # -- expressions -----------------------------------------------------------------------------------------
 
@@ -679,11 +654,9 @@ class _Body:
             return f"({truth} ? ({c})({_as(a, ka, joined)}) : ({c})({_as(b, kb, joined)}))", joined
         if kind == "b":
             return f"({truth} ? {_as(a, ka, joined)} : {_as(b, kb, joined)})", joined
-        if isinstance(joined, tuple):
+        if (joined := _varying(joined)) not in _SELECT:
             raise UntranslatableError(f"{self.name}: a conditional of several values that differs from lane to lane")
-        joined = _varying(joined)
-        select = "sel" if joined == "F" else "sel_mask"
-        return f"{select}({_as(truth, kind, 'B')}, {_as(a, ka, joined)}, {_as(b, kb, joined)})", joined
+        return f"{_SELECT[joined]}({_as(truth, kind, 'B')}, {_as(a, ka, joined)}, {_as(b, kb, joined)})", joined
 
     def _of_call(self, node: ast.Call) -> _Coded:
         if node.keywords:
@@ -746,16 +719,7 @@ def _joined(a: Kind | None, b: Kind) -> Kind | None:
     """The kind that can hold both; None if there is none."""
     if a is None or a == b:
         return b
-    pair = {a, b}
-    if pair == {"f", "i"}:
-        return "f"
-    if pair <= {"b", "i", "f"}:
-        return "f" if "f" in pair else "i"
-    if pair <= {"b", "B"}:
-        return "B"
-    if pair <= {"f", "i", "F", "b"}:
-        return "F"
-    return None
+    return next((kind for kinds, kind in _HOLDING if {a, b} <= {*kinds}), None)
 
 
 def _as(code: str, kind: str, wanted: str) -> str:
