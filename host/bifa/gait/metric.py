@@ -18,7 +18,9 @@ _LONGEST_BODY_M = 0.06
 # Share of the advance by which cycles may differ on a rippling supply or with a growing tether: such walks are never
 # periodic to a thousandth, but a gait that fails differs by more.
 _MAX_VARIATION = 0.2
-_SETTLED = 2e-3  # share of the advance by which successive cycles of a walk that has settled differ at most
+# Share of the advance to which three successive cycles of a walk that has settled agree. A robot that falls does so
+# earlier, while it gets going.
+_SETTLED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,9 @@ class Metric:
     while both ends slide. tolerance_m: of the integrator, per step. direction: -1 to count backward walking.
     inclination_deg: of the pipe, uphill positive. clock: seconds per second of the Uno, to which gaits and speeds
     refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies. unlike: every cycle
-    differs from the one before, so that no walk settles. settled: relative difference between the advances of two
-    successive cycles after which the others are not simulated; 0 to simulate all.
+    differs from the one before, so that no walk settles. settled: relative difference between the advances of three
+    successive cycles at which a walk counts as settled, and the other cycles are not simulated: of ten it takes five or
+    six. 0 to simulate all.
     """
 
     cycles: int = 10
@@ -58,7 +61,7 @@ class Metric:
     clock: float = 1.0
     dead_time_s: float = 0.0
     unlike: bool = False
-    settled: float = 0.0
+    settled: float = _SETTLED
 
     @property
     def is_plain(self) -> bool:
@@ -71,18 +74,14 @@ class Metric:
         return CLEAR
 
     def finer(self) -> "Metric":
-        """Return the metric for finalists: twenty cycles, the last ten of them judged, and a far smaller step."""
-        return replace(self, cycles=20, judged=10, tolerance_m=1e-7).in_full()
+        """Return the metric for finalists: twenty cycles, all simulated and the last ten judged, and a far smaller
+        step."""
+        return replace(self, cycles=20, judged=10, tolerance_m=1e-7, settled=0.0).in_full()
 
     def in_full(self) -> "Metric":
         """Return the metric with all the cycles of a measured walk, the second half judged, if walks never settle: with
         a tether a gait may fail as late as after sixteen cycles."""
         return replace(self, cycles=MAX_CYCLES, judged=MAX_CYCLES // 2) if self.unlike else self
-
-    def until_settled(self) -> "Metric":
-        """Return the metric for climbs over drawn robots, in which a walk ends once two cycles advance alike: of ten
-        cycles it takes four or five. A robot that falls does so earlier, while it gets going."""
-        return self if self.unlike else replace(self, settled=_SETTLED)
 
     def quicker(self) -> "Metric":
         """Return the metric for searches over many draws: six cycles, longer steps; the gaits it accepts are judged
@@ -96,7 +95,7 @@ class Metric:
 
     def of_unlike_cycles(self) -> "Metric":
         """Return the metric for a robot that never walks the same cycle twice."""
-        return replace(self, periodic=_MAX_VARIATION, unlike=True)
+        return replace(self, periodic=_MAX_VARIATION, unlike=True, settled=0.0)
 
     def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""
@@ -119,26 +118,18 @@ class Passage:
     inclination_deg: float = 0.0
     clock: float = 1.0
     dead_time_s: float = 0.0
+    settled: float = 0.0
 
     @property
     def terrain(self) -> np.ndarray:
         """The tunnel, 10 cm ahead of the head."""
         return terrain(tunnel())
 
-    @property
-    def settled(self) -> float:
-        """No walk ends early."""
-        return 0.0
-
     def finer(self) -> "Passage":
         """Return the metric for finalists: a smaller step."""
         return replace(self, tolerance_m=1e-6)
 
     def in_full(self) -> "Passage":
-        """Return the same metric: a tunnel is passed or not."""
-        return self
-
-    def until_settled(self) -> "Passage":
         """Return the same metric: a tunnel is passed or not."""
         return self
 

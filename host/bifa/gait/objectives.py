@@ -8,7 +8,7 @@ import numpy as np
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.pool import Simulations
 from bifa.gait.space import SearchSpace
-from bifa.simulate import Plant, gait_rows
+from bifa.simulate import Plant
 
 QUANTILE = 0.10
 _FIRST_DRAWS = 3
@@ -23,7 +23,7 @@ class NominalSpeed:
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Speeds (n,) at points (n, dimensions) of the unit cube."""
-        return on_model(self._runs, self._plant, gait_rows(self._space.gaits(points)), self._metric)
+        return on_model(self._runs, self._plant, self._space.rows(points), self._metric)
 
 
 class RobustSpeed:
@@ -61,7 +61,7 @@ class RobustSpeed:
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Values (n,) in mm/s at points (n, dimensions) of the unit cube."""
-        rows = gait_rows(self._space.gaits(points))
+        rows = self._space.rows(points)
         draws = len(self._draws)
         order = np.argsort(-self._failures, kind="stable")
         met = np.full((len(rows), draws), np.inf)

@@ -66,6 +66,7 @@ _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004))
 # on others. Copies slower by these fractions follow.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
+_SOONER = 5.0  # how much more than in the check successive cycles of a walk that counts as settled may differ
 _BASINS, _STARTS = 24, 8  # explored gaits where climbs on robots start; those to refine if there were no climbs
 _MIN_SPACING, _WIDE_SPACING = 0.003, 0.02  # minimum distance between finalists, on some axis of the unit cube
 # Climbs on robots: how many families to start from, and the shares of the best value that these, and the end points of
@@ -166,7 +167,8 @@ class SearchRun:
         """Return the objective of a round, on robots of its own."""
         settings = self.settings
         draws = self.robots(stage.draws, settings.seed + 500_000 * number)
-        metric = replace(settings.metric.in_full().until_settled(), tolerance_m=stage.tolerance_m)
+        metric = settings.metric.in_full()
+        metric = replace(metric, tolerance_m=stage.tolerance_m, settled=_SOONER * metric.settled)
         share = stage.quantile * settings.share / QUANTILE
         nominal, space = plant(self.model), settings.space
         return RobustSpeed(self.runs, nominal, draws, space, metric, share, stage.abandon, stage.jitter)
@@ -343,7 +345,7 @@ def _fastest_finalist(search: SearchRun, explored: Evaluated) -> tuple[Gait, flo
     near, far = (explored.finalists(_NOMINAL_FINALISTS, apart=apart) for apart in (_MIN_SPACING, _WIDE_SPACING))
     slower = np.concatenate([space.slower(points, share) for points in (near, far) for share in _SLOWER])
     for points in (near, far, slower):
-        more = gait_rows(space.gaits(points))
+        more = space.rows(points)
         rows, speeds = np.vstack([rows, more]), np.append(speeds, search.fine_speeds(more))
         search.on_progress("verify", 0.5, float(speeds.max()))
         if speeds.max() > _WALK_RATIO * explored.best_value:
@@ -376,7 +378,7 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
     far = explored.finalists(_NOMINAL_FINALISTS, apart=_WIDE_SPACING)
     otherwise, most = None, (False, -1.0)
     for candidates in (near, far):
-        rows = gait_rows(space.gaits(candidates))
+        rows = space.rows(candidates)
         for row, speed in zip(rows, search.fine_speeds(rows), strict=True):
             if speed <= 0.0:
                 continue

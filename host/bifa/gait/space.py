@@ -50,12 +50,14 @@ class SearchSpace:
 
     def gaits(self, points: np.ndarray) -> list[Gait]:
         """Convert points of shape (n, dimensions) to gaits."""
+        return [Gait(*row) for row in self.rows(points).tolist()]
+
+    def rows(self, points: np.ndarray) -> np.ndarray:
+        """Convert points of shape (n, dimensions) to gaits as rows, shape (n, 6)."""
         lower, width = self._box
         values = lower + folded(np.atleast_2d(points), self.wraps) * width
-        return [
-            Gait(**{name: value for axis, value in zip(self.axes, row, strict=True) for name in axis.sets})
-            for row in values.tolist()
-        ]
+        axis_of = {name: number for number, axis in enumerate(self.axes) for name in axis.sets}
+        return values[:, [axis_of[name] for name in GAIT_NAMES]]
 
     def slower(self, points: np.ndarray, share: float) -> np.ndarray:
         """Lengthen the period of points (n, dimensions) by the fraction `share`, clipped to the space."""
@@ -84,7 +86,7 @@ class SearchSpace:
         vacuum and under pressure, by how much head and tail lead its switch to vacuum (at most half a period), and how
         long both ends are at vacuum. The other times keep their values in seconds.
         """
-        rows = gait_rows(self.gaits(points))
+        rows = self.rows(points)
         body_vacuum, body_pressure, head_ahead, tail_ahead, ends_vacuum = (longer_s.get(name, 0.0) for name in TIMES)
         period_s, ahead, at_vacuum = rows[:, :1], rows[:, 1:3] / 360.0, rows[:, 3:]
         ahead_s = (ahead - np.round(ahead)) * period_s + [head_ahead, tail_ahead]
@@ -111,18 +113,14 @@ def folded(points: np.ndarray, wraps: np.ndarray) -> np.ndarray:
     return np.where(wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))
 
 
-def paper_space(
-    period_s: tuple[float, float] = (2.0, 4.0),
-    duty_body: tuple[float, float] = (0.2, 0.8),
-    duty_ends: tuple[float, float] = (0.2, 0.8),
-) -> SearchSpace:
+def paper_space(period_s: tuple[float, float] = (2.0, 4.0)) -> SearchSpace:
     """Return the box of section V.B, in which both ends share one duty, d_2 = d_3."""
     return SearchSpace(
         (
             SearchAxis("period_s", ("period_s",), *period_s, "s"),
             SearchAxis("psi12_deg", ("psi12_deg",), 0.0, 360.0, "degrees", wraps=True),
             SearchAxis("psi13_deg", ("psi13_deg",), 0.0, 360.0, "degrees", wraps=True),
-            SearchAxis("duty_body", ("duty_body",), *duty_body, ""),
-            SearchAxis("duty_ends", ("duty_head", "duty_tail"), *duty_ends, ""),
+            SearchAxis("duty_body", ("duty_body",), 0.2, 0.8, ""),
+            SearchAxis("duty_ends", ("duty_head", "duty_tail"), 0.2, 0.8, ""),
         )
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -50,11 +51,12 @@ class Gait:
 
 
 GAIT_NAMES = tuple(item.name for item in fields(Gait))
+_VALUES = attrgetter(*GAIT_NAMES)
 
 
 def gait_rows(gaits: Sequence[Gait]) -> np.ndarray:
     """Stack gaits as rows, shape (n, 6), in the order of a gait's fields."""
-    return np.array([list(gait.as_dict().values()) for gait in gaits], dtype=float).reshape(-1, len(GAIT_NAMES))
+    return np.array([_VALUES(gait) for gait in gaits], dtype=float).reshape(-1, len(GAIT_NAMES))
 
 
 # The paper's baseline (section V.B): the body switches only when head or tail fully anchors.

@@ -18,8 +18,8 @@ from bifa.simulate.plant import Plant, plant
 from bifa.simulate.timeline import gait_switches
 
 FAST_TOLERANCE_M = 1e-5
-_PIECES_PER_WORKER = 8
-_LANES_FULL = 4  # walks per lane in a piece: at its end, lanes are idle
+_PIECES_PER_WORKER = 2
+_LANES_FULL = 4  # least number of walks per lane in a piece: at its end, lanes are idle
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,10 @@ def speeds(
 ) -> Advance:
     """Simulate gaits (n, 6), all with one model or each with its own of n models; arrays have shape (n, cycles).
     `dead_time_s`: how long the Uno vents a chamber when switching between supplies. `settled`: if not 0, a walk ends
-    once a cycle's advance differs by less than this share from the one before, and the other cycles repeat it.
+    once the advance of a cycle and those of the two before agree to within this share, and the other cycles repeat it.
 
-    Runs on `executor`, or else in `workers` threads (by default one per core) without the GIL. Rows are distributed in
-    small pieces, since gaits differ in cost. Angles need not be within 0-360.
+    Runs on `executor`, or else in `workers` threads (by default one per core) without the GIL. Rows are dealt out in
+    turn, since gaits differ in cost and neighbors are alike. Angles need not be within 0-360.
     """
     gaits = np.ascontiguousarray(gaits, dtype=float).reshape(-1, 6)
     if not (np.isfinite(gaits).all() and (gaits[:, 0] > 0.0).all()):
@@ -69,16 +69,17 @@ def speeds(
     n = gaits.shape[0]
     flats = [plant(model)] * n if isinstance(model, (Model, Plant)) else [plant(one) for one in model]
     count = workers or cores()
-    pieces = min(_PIECES_PER_WORKER * count, -(-n // _full_lanes())) if executor or count > 1 else 1
-    shares = [piece for piece in np.array_split(np.arange(n), max(1, pieces)) if piece.size]
+    full = _LANES_FULL * lanes.width() if lanes.width() > 1 else 1  # with fewer walks in a call, lanes are idle
+    pieces = max(1, min(_PIECES_PER_WORKER * count, -(-n // full))) if executor or count > 1 else 1
+    shares = [slice(first, None, pieces) for first in range(min(pieces, n))]
     if executor is None and len(shares) > 1:
         executor = _pool(count)
     run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s, settled)
     each: Callable[..., Any] = executor.map if executor else map
-    found = each(run, [flats[piece[0] : piece[-1] + 1] for piece in shares], [gaits[piece] for piece in shares])
+    found = each(run, [flats[share] for share in shares], [gaits[share] for share in shares])
     advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
-    for piece, (advanced, slid) in zip(shares, found, strict=True):
-        advance[piece], slip[piece] = advanced, slid
+    for share, (advanced, slid) in zip(shares, found, strict=True):
+        advance[share], slip[share] = advanced, slid
     return Advance(advance, slip, gaits[:, 0])
 
 
@@ -100,11 +101,6 @@ def _progress(
     rows = np.array(lanes.march(flats, what, together=False))
     starts = np.array([flat.q[layout.BODY + layout.CONTRACTED] for flat in flats])
     return np.diff(rows[:, 0], prepend=starts[:, None]), np.diff(rows[:, 1], prepend=0.0)
-
-
-def _full_lanes() -> int:
-    """Smallest number of walks worth a call: with fewer, lanes are idle for much of it."""
-    return _LANES_FULL * lanes.width() if lanes.width() > 1 else 1
 
 
 def cores() -> int:

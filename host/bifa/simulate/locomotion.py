@@ -64,7 +64,7 @@ def progress_row(plant, rig, run, row):
 @kernel
 def walk_record(plant, rig, states_of_effects, times, chamber, command, sample_times, tolerance, settled):
     """Simulate a walk from rest at time 0. Returns (n, COLUMNS) at `sample_times` (nondecreasing, none negative). If
-    `settled` is not 0, all rows after two in which the head advances alike, within that share, are extrapolated."""
+    `settled` is not 0, all rows after three in which the head advances alike, within that share, are extrapolated."""
     run = new_run(states_of_effects)
     contracted(plant, rig, run)
     late, order = delayed(plant, times, chamber, command)
@@ -73,9 +73,9 @@ def walk_record(plant, rig, states_of_effects, times, chamber, command, sample_t
     for k in range(sample_times.size):
         i = march_through(plant, rig, run, sample_times[k], tolerance, late, order, chamber, command, i)
         walk_row(plant, rig, run, out[k])
-        if settled > 0.0 and k > 1:
-            now, before = out[k, X_HEAD] - out[k - 1, X_HEAD], out[k - 1, X_HEAD] - out[k - 2, X_HEAD]
-            if abs(now - before) <= settled * abs(now):
+        if settled > 0.0 and k > 2:
+            advance = out[k - 2 : k + 1, X_HEAD] - out[k - 3 : k, X_HEAD]
+            if np.max(np.abs(advance - advance[2])) <= settled * abs(advance[2]):
                 for later in range(k + 1, sample_times.size):
                     out[later] = 2.0 * out[later - 1] - out[later - 2]
                 break

@@ -70,14 +70,14 @@ def test_what_never_settles_is_judged_in_full_by_the_second_half_of_what_is_walk
         assert metric.judge(falling).counted_mm_s == pytest.approx([23.0])
     assert Metric().in_full() == Metric()
     assert Metric().finer().cycles == 20
-    assert whole.until_settled() == whole
+    assert whole.settled == Metric().finer().settled == 0.0
 
 
-def test_climbs_end_a_walk_once_it_has_settled_and_see_the_same_robots_fall(runs):
+def test_a_walk_ends_once_it_has_settled_and_the_same_robots_fall(runs):
     """The gait is at the cliff: some robots walk with it, others fall."""
     gaits = gait_rows([replace(ROBUST, period_s=ROBUST.period_s * factor) for factor in (1.0, 0.98, 0.96)])
     robots = spread_of(nominal()).plants(nominal(), 32, 0)
-    whole, ended = (distribution(runs, robots, gaits, one) for one in (Metric(), Metric().until_settled()))
+    whole, ended = (distribution(runs, robots, gaits, one) for one in (Metric(settled=0.0), Metric()))
     falls = whole < 0.7 * whole.max()
     assert 0.05 < falls.mean() < 0.95
     np.testing.assert_array_equal(ended < 0.7 * whole.max(), falls)

@@ -162,12 +162,14 @@ static int begin(Bench *bench, const Setting *setting, const Job *job, int i) {
     return 1;
 }
 
-// If the last two cycles of a walk advanced alike, to within the share `settled`, extrapolate its progress to the other
-// samples.
+// If the last three cycles of a walk advanced alike, to within the share `settled`, extrapolate its progress to the
+// other samples.
 static void extrapolate(Schedule *s, double settled) {
     const Job *job = s->job;
     const double *head = job->rows + s->next_sample;
-    if (s->next_sample < 3 || !(fabs(head[-1] - 2.0 * head[-2] + head[-3]) <= settled * fabs(head[-1] - head[-2]))) return;
+    if (s->next_sample < 4) return;
+    const double last = head[-1] - head[-2], before = head[-2] - head[-3], first = head[-3] - head[-4];
+    if (!(fmax(fabs(last - before), fabs(last - first)) <= settled * fabs(last))) return;
     for (; s->next_sample < job->samples; s->next_sample++)
         for (int c = 0; c < COLUMNS_OF[PROGRESS]; c++) {
             double *out = job->rows + c * job->samples + s->next_sample;

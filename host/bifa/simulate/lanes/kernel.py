@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,30 +21,29 @@ from bifa.simulate.timeline import Timeline
 
 WALK, SEEN, PROGRESS, STEP, ANCHOR = range(5)
 COLUMNS = (locomotion.COLUMNS, 7, 2, 3, 5)
+
+
+def _fields(names: str, kind: Any) -> list[tuple[str, Any]]:
+    return [(name, kind) for name in names.split()]
+
+
+# A job, and the setting of all jobs, as in drive.c.
 _JOB = np.dtype(
     [
-        *((name, "i8") for name in ("q", "active", "body_curve", "small_curve", "learnt")),
-        *((name, "f8") for name in ("incline_rad", "positive_psi", "negative_psi")),
+        *_fields("q active body_curve small_curve learnt", "i8"),
+        *_fields("incline_rad positive_psi negative_psi", "f8"),
         ("share", "f8", 3),
-        *(
-            (name, "i8")
-            for name in ("switch_s", "chamber", "command", "switches", "sample_s", "path", "samples", "rows")
-        ),
+        *_fields("switch_s chamber command switches sample_s path samples rows", "i8"),
     ]
 )
 
 
 class _Setting(ctypes.Structure):
     _fields_ = [
-        *(
-            (name, ctypes.c_int64)
-            for name in (
-                *("parts", "free", "wall", "terrain_columns", "curve_rows", "learnt_terms", "learnt_columns"),
-                *("experiment", "together"),
-            )
-        ),
+        *_fields("parts free wall terrain_columns curve_rows learnt_terms learnt_columns", ctypes.c_int64),
+        *_fields("experiment together", ctypes.c_int64),
         ("terrain", ctypes.c_void_p),
-        *((name, ctypes.c_double) for name in ("extended_psi", "rate_m_s", "load_cell_N_m", "tolerance_m", "settled")),
+        *_fields("extended_psi rate_m_s load_cell_N_m tolerance_m settled", ctypes.c_double),
     ]
 
 
@@ -51,8 +51,8 @@ class _Setting(ctypes.Structure):
 class Experiment:
     """An experiment on several robots: mounting, switches and sample times of each, and the settings common to all.
 
-    settled: share of the advance by which successive cycles of a `PROGRESS` may differ for the rest to be extrapolated;
-    0 to simulate all.
+    settled: share of the advance by which three successive cycles of a `PROGRESS` may differ for the rest to be
+    extrapolated; 0 to simulate all.
     """
 
     kind: int
@@ -86,18 +86,16 @@ class Kernel:
         """Run an experiment. Returns rows (columns, samples) for each robot. `together`: packs of `lanes` robots share
         their steps; otherwise each lane has steps of its own, and takes the next robot when it has finished one."""
         jobs, setting, kept = _jobs(plants, what.rigs)
-        setting.experiment, setting.together, setting.tolerance_m = what.kind, together, what.tolerance_m
-        setting.extended_psi = what.extended_psi
-        setting.rate_m_s, setting.load_cell_N_m = what.rate_m_s, what.load_cell_N_m
-        setting.settled = what.settled
-        jobs["switch_s"] = _addresses([one.time_s for one in what.switches])
-        jobs["chamber"] = _addresses([one.chamber for one in what.switches])
-        jobs["command"] = _addresses([one.command for one in what.switches])
-        jobs["switches"] = [one.time_s.size for one in what.switches]
-        jobs["sample_s"], jobs["samples"] = _addresses(what.sample_s), [times.size for times in what.sample_s]
+        setting.experiment, setting.together = what.kind, together
+        for name in ("extended_psi", "rate_m_s", "load_cell_N_m", "tolerance_m", "settled"):
+            setattr(setting, name, getattr(what, name))
+        switch_s = _fill(jobs, "switch_s", [one.time_s for one in what.switches], "switches")
+        chamber = _fill(jobs, "chamber", [one.chamber for one in what.switches], "switches")
+        command = _fill(jobs, "command", [one.command for one in what.switches], "switches")
+        sample_s = _fill(jobs, "sample_s", what.sample_s, "samples")
         rows = _rows_for(jobs, COLUMNS[what.kind])
         self.call(self._march, setting, jobs)
-        del kept
+        del kept, switch_s, chamber, command, sample_s
         return rows
 
     def load(
@@ -158,6 +156,13 @@ def _addresses(arrays: Sequence[np.ndarray]) -> list[int]:
     known = {id(array): array for array in arrays}
     found = {key: _address(array) for key, array in known.items()}
     return [found[id(array)] for array in arrays]
+
+
+def _fill(jobs: np.ndarray, name: str, arrays: Sequence[np.ndarray], sizes: str) -> np.ndarray:
+    """Write the address and the size of each job's array. Returns the memory that they are in."""
+    whole, counts = np.concatenate(arrays), np.array([array.size for array in arrays])
+    jobs[name], jobs[sizes] = _address(whole) + whole.itemsize * (np.cumsum(counts) - counts), counts
+    return whole
 
 
 def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
