@@ -73,7 +73,10 @@ def leave(robot: Mover) -> None:
     """Restore the earlier signal handlers; `robot` has been stopped."""
     _active_robots.remove(robot)
     if not _active_robots and threading.current_thread() is threading.main_thread():
-        _unwatch_parent()
+        if _parents:
+            _prctl(_SET_DEATH_SIGNAL, 0)
+            signal.signal(_DEATH, signal.SIG_DFL)
+            _parents.pop()
         while _earlier_handlers:
             signal.signal(*_earlier_handlers.popitem())
         sys.unraisablehook = _earlier_hook.pop()
@@ -146,13 +149,6 @@ def _watch_parent() -> None:
     _prctl(_SET_DEATH_SIGNAL, int(_DEATH))
 
 
-def _unwatch_parent() -> None:
-    if _parents:
-        _prctl(_SET_DEATH_SIGNAL, 0)
-        signal.signal(_DEATH, signal.SIG_DFL)
-        _parents.pop()
-
-
 def death_signal() -> int | None:
     """Signal that this process gets when its parent dies, 0 for none; None where the system has no such setting."""
     now = ctypes.c_int()
@@ -174,10 +170,17 @@ def _cancel_retries() -> None:
 def _retry_interrupt(lost: "sys.UnraisableHookArgs") -> None:
     """Raise a KeyboardInterrupt again that Python dropped, as it does in clean-up (`__del__`, a generator's end)."""
     if lost.exc_type is KeyboardInterrupt:
-        _retry_timers.append(threading.Timer(AGAIN_AFTER_S, signal.raise_signal, [signal.SIGINT]))
+        _retry_timers.append(threading.Timer(AGAIN_AFTER_S, _interrupt_main_thread))
         _retry_timers[-1].start()
     else:
         _earlier_hook[-1](lost)
+
+
+def _interrupt_main_thread() -> None:
+    if hasattr(signal, "pthread_kill"):  # wakes it if it is blocked, for example asleep
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:
+        signal.raise_signal(signal.SIGINT)
 
 
 def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> Report:
