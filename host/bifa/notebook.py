@@ -45,20 +45,22 @@ class Robot:
 
     def speed_mm_s(self, gait: Gait | str | Path = BASELINE, cycles: int = 10) -> float:
         """Simulate a walk from rest; returns the speed of its last cycle."""
-        from bifa.simulate import gait_rows, speeds
+        from bifa.simulate import speed
 
-        return float(speeds(self.model, gait_rows([_gait(gait)]), _at_least_one(cycles), 1e-6).speed_mm_s[0])
+        return float(speed(self.model, _gait(gait), _at_least_one(cycles), 1e-6).speed_mm_s)
 
     def diagnose(self, dataset: Dataset, *, seed: int = 0, matters: Mapping[str, float] | None = None) -> Verdict:
         """Diagnose from a data set what this robot's base model lacks; returns a `lacuna.Verdict`. `matters`: the RMS
         error, by column, up to which a prediction is good enough. Takes minutes of processor time for a campaign."""
         import lacuna
+        from bifa.identify.doubts import with_doubts
         from bifa.identify.start import prepare
         from bifa.problem.accuracy import accuracies
 
         system = prepare(dataset, self.model)
         system.accuracies = accuracies([f"{name}={value}" for name, value in (matters or {}).items()])
-        return lacuna.diagnose(system, seed=seed)
+        found = lacuna.diagnose(system, seed=seed)
+        return lacuna.Verdict(system, with_doubts(found.diagnosis, system))
 
     def completed(self, verdict: Verdict) -> Robot:
         """Return the robot completed by a verdict: with its fitted values, effects and learnt curves."""

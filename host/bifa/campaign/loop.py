@@ -21,6 +21,7 @@ from bifa.gait.library.scenarios import provenance
 from bifa.gait.objectives import QUANTILE
 from bifa.gait.uncertainty import SPREAD
 from bifa.identify.completed import completed_model
+from bifa.identify.doubts import with_doubts
 from bifa.identify.identification import identify
 from bifa.identify.start import prepare
 from bifa.measure import plan
@@ -46,15 +47,17 @@ def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stag
     With instruments worked by hand, only the stages that measure need the robot: the diagnosis names the experiment
     that would separate effects it confuses, and leaves the decision to the person.
     """
+    # no bar over the questions to a person at the bench
+    on_trial: OnProgress = (lambda what, share: None) if setup.is_by_hand else on_progress
     stages = [
-        *_characterize(setup, effort, on_progress),
-        _fit(setup, on_progress),
+        *_characterize(setup, effort, on_trial),
+        _fit(on_progress),
         _optimize("base", (), setup, on_progress),
-        _walk("base", {"baseline": None, "base": "gait-base.toml"}, 1, setup, effort, on_progress),
+        _walk("base", {"baseline": None, "base": "gait-base.toml"}, 1, setup, effort, on_trial),
         _diagnose(setup, on_progress),
         _optimize("completed", ("gait-base.toml",), setup, on_progress),
-        _walk("completed", {"completed": "gait-completed.toml"}, 2, setup, effort, on_progress),
-        _feed_back(setup, effort, on_progress),
+        _walk("completed", {"completed": "gait-completed.toml"}, 2, setup, effort, on_trial),
+        _feed_back(setup, effort, on_progress, on_trial),
     ]
     if setup.is_virtual:
         stages.append(_unseal(setup))
@@ -62,12 +65,11 @@ def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stag
     return stages
 
 
-def _characterize(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:
+def _characterize(setup: Setup, effort: Effort, on_trial: OnProgress) -> list[Stage]:
     """On a real robot the person's known values are not part of the measurement; a second stage declares them, so that
     correcting one does not require measuring again."""
     kept, trials = not setup.is_virtual, plan.session(quick=effort.quick)
     data, known = ("measured", {}) if kept else ("bench", dict(setup.known))
-    on_trial = _unless_by_hand(setup, on_progress)
 
     def run(inputs: Path, outputs: Path) -> None:
         with setup.open(0) as rig:
@@ -99,7 +101,7 @@ def _declare(setup: Setup) -> Stage:
     return Stage("declare", "declare what is known", ("measured",), ("bench",), run, {"known": dict(setup.known)})
 
 
-def _fit(setup: Setup, on_progress: OnProgress) -> Stage:
+def _fit(on_progress: OnProgress) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
         found = identify(read_dataset(inputs / "bench"), on_progress=lambda what: on_progress(what, 0.0))
         save_model(outputs / "model-base.toml", found.model)
@@ -157,7 +159,7 @@ def found_gait(
 
 
 def _walk(
-    which: str, gaits: dict[str, str | None], number: int, setup: Setup, effort: Effort, on_progress: OnProgress
+    which: str, gaits: dict[str, str | None], number: int, setup: Setup, effort: Effort, on_trial: OnProgress
 ) -> Stage:
     """Walk gaits, each for as many cycles as the model `which` takes to settle with it."""
     name, walks, model = f"walk-{which}", f"walks-{which}", f"model-{which}.toml"
@@ -167,8 +169,7 @@ def _walk(
         robot = load_model(inputs / model)
         cycles = {key: planned_cycles(robot, gait, effort.cycles) for key, gait in loaded.items()}
         with setup.open(number) as rig:
-            on_walk = _unless_by_hand(setup, on_progress)
-            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, on_walk, setup.hands)
+            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, on_trial, setup.hands)
 
     needs = (model, *(file for file in gaits.values() if file))
     settings = setup.settings(number) | {"effort": asdict(effort)}
@@ -179,8 +180,9 @@ def _walk(
 def _run_diagnosis(
     setup: Setup, on_progress: OnProgress, dataset: Dataset, suspected: Collection[str] = ()
 ) -> Diagnosis:
-    system, seed = prepare(dataset), setup.seed
-    return diagnose(system, seed=seed, suspected=suspected, on_progress=lambda what: on_progress(spoken(what), 0.0))
+    system, on_step = prepare(dataset), lambda what: on_progress(spoken(what), 0.0)
+    found = diagnose(system, seed=setup.seed, suspected=suspected, on_progress=on_step)
+    return with_doubts(found, system)
 
 
 def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
@@ -192,14 +194,8 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
         (outputs / "separating").mkdir()
         ran: tuple[NextExperiment, ...] = ()
         if not setup.is_by_hand:
-            dataset, found, ran = resolve(
-                dataset,
-                found,
-                diagnosed,
-                lambda n: setup.open(_SEPARATING_STAGE + n),
-                outputs / "separating",
-                on_progress,
-            )
+            rigs, folder = (lambda n: setup.open(_SEPARATING_STAGE + n)), outputs / "separating"
+            dataset, found, ran = resolve(dataset, found, diagnosed, rigs, folder, on_progress)
         record = as_record(found) | {"separated_by": [asdict(experiment) for experiment in ran]}
         del record["seconds"]  # the same seed gives the same bytes
         (outputs / "diagnosis.json").write_text(json.dumps(record, indent=1) + "\n")
@@ -213,7 +209,7 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
     return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings, by_hand=measures)
 
 
-def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
+def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: OnProgress) -> Stage:
     def complete(dataset: Dataset, suspected: tuple[str, ...]) -> tuple[Model, tuple[str, ...]]:
         found = _run_diagnosis(setup, on_progress, dataset, suspected)
         return completed_model(found.final), tuple(effect.name for effect in found.effects)
@@ -221,8 +217,8 @@ def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
         with setup.open(_ROUND_STAGE + number) as rig:
-            gaits, on_walk = {f"round-{number}": gait}, _unless_by_hand(setup, on_progress)
-            return measure_walks(rig, folder, gaits, cycles, effort.repeats, on_walk, setup.hands)
+            gaits = {f"round-{number}": gait}
+            return measure_walks(rig, folder, gaits, cycles, effort.repeats, on_trial, setup.hands)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
@@ -238,11 +234,6 @@ def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     settings = setup.settings(_ROUND_STAGE) | {"effort": asdict(effort)}
     kept = not setup.is_virtual
     return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=kept, by_hand=kept)
-
-
-def _unless_by_hand(setup: Setup, on_progress: OnProgress) -> OnProgress:
-    """`on_progress`, or no progress at all while a person at the bench is being prompted."""
-    return (lambda what, share: None) if setup.is_by_hand else on_progress
 
 
 def _unseal(setup: Setup) -> Stage:

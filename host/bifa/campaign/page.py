@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifa.campaign.again import ROUNDS, Ending
+from bifa.gait.settling import STANDING_MM_S
 from bifa.report.animation import animate_walks
 from bifa.report.chart import Chart
 from bifa.report.diagnosis import (
@@ -18,6 +19,7 @@ from bifa.report.diagnosis import (
     NOISE_FLOOR,
     RESIDUAL,
     RMS,
+    Labels,
     effects_table,
     found_sentences,
     further,
@@ -28,7 +30,6 @@ from bifa.report.diagnosis import (
 from bifa.report.evidence import (
     BASE,
     COMPLETED,
-    STANDING_MM_S,
     errors_chart,
     residual_charts,
     robustness_chart,
@@ -65,7 +66,7 @@ def campaign_page(
     diagnosis: Mapping[str, Any],
     traces: Sequence[Mapping[str, Any]],
     walks: Mapping[str, Walk],
-    labels: Mapping[str, str],
+    labels: Labels,
     robot: str,
     made: Sequence[tuple[str, str]],
 ) -> Page:
@@ -101,11 +102,10 @@ def _speed_sentences(gaits: Sequence[Mapping[str, Any]]) -> str:
     measured = {gait["gait"]: gait["measured"] for gait in gaits}
     fastest = max(("completed", *(["edge"] if "edge" in measured else [])), key=lambda name: measured[name])
     times = measured[fastest] / measured["baseline"] if measured["baseline"] > 0 else float("inf")
-    said = (
+    return (
         f"The gait found with the completed model walks {measured[fastest]:.1f} mm/s, "
-        f"{times:.1f} times as fast as the baseline."
+        f"{times:.1f} times as fast as the baseline. {_gain_sentence(measured['base'], measured[fastest])}"
     )
-    return f"{said} {_gain_sentence(measured['base'], measured[fastest])}"
 
 
 def _gain_sentence(base_mm_s: float, completed_mm_s: float) -> str:
@@ -133,12 +133,8 @@ def _findings_section(summary: Mapping[str, Any], diagnosis: Mapping[str, Any]) 
 
 
 def _residuals_section(
-    summary: Mapping[str, Any],
-    diagnosis: Mapping[str, Any],
-    traces: Sequence[Mapping[str, Any]],
-    labels: Mapping[str, str],
+    summary: Mapping[str, Any], diagnosis: Mapping[str, Any], traces: Sequence[Mapping[str, Any]], labels: Labels
 ) -> ChartedSection:
-    groups = residual_charts(traces)
     return ChartedSection(
         "Where the base model is off, and what is left",
         [
@@ -148,7 +144,7 @@ def _residuals_section(
             "the noise floor: 1 is as good as a repeat.",
         ],
         [prediction_table(summary["prediction_error"]), noise_table(diagnosis["error"])],
-        [errors_chart(diagnosis["error"]), *groups.values()],
+        [errors_chart(diagnosis["error"]), *residual_charts(traces).values()],
     )
 
 
@@ -156,18 +152,14 @@ def walking(walks: Mapping[str, Walk]) -> ChartedSection:
     """The walk for which the base model has the largest error, as predicted and as measured."""
     walk = most_missed(walks)
     svg, seconds, rate = motion_of(walk)
-    shown_s = round(seconds * rate, 1)
     how_fast = "in real time" if round(rate, 1) == 1.0 else f"at {rate:.1f} times real time"
-    return ChartedSection(
-        "The robot, walking",
-        [
-            f"The {walk.title}, for which the base model has the largest error: as the base model predicts it, as the "
-            "motion capture measured it, and as the completed model predicts it."
-        ],
-        motion=Motion(
-            svg, seconds, shown_s, f"To scale, {how_fast}; blue body, orange head, green tail. The dot is the clock."
-        ),
+    said = (
+        f"The {walk.title}, for which the base model has the largest error: as the base model predicts it, as the "
+        "motion capture measured it, and as the completed model predicts it."
     )
+    caption = f"To scale, {how_fast}; blue body, orange head, green tail. The dot is the clock."
+    motion = Motion(svg, seconds, round(seconds * rate, 1), caption)
+    return ChartedSection("The robot, walking", [said], motion=motion)
 
 
 def most_missed(walks: Mapping[str, Walk]) -> Walk:
@@ -207,27 +199,21 @@ def _gaits_section(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> Cha
     ]
     said += [
         f"On robots almost identical to this one the {walks[name].title} often does not walk at all: "
-        f"{100 * share:.0f} % of {robots} robots whose parameters differ by 2 % stay below {STANDING_MM_S} mm/s."
+        f"{100 * share:.0f} % of {robots} robots whose parameters differ by 2 % stay below {STANDING_MM_S:g} mm/s."
         for name, share in standing.items()
         if share >= _MIN_STANDING_SHARE
     ]
-    rows = [
-        [
-            GAIT_NAMES[name],
-            f"{np.median(speeds):.1f}",
-            f"{np.quantile(speeds, 0.1):.1f}",
-            f"{100 * standing[name]:.0f} %",
-        ]
-        for name, speeds in summary["robustness"].items()
-    ]
-    table = PageTable(
-        ["gait", "median, mm/s", "nine in ten reach, mm/s", "do not walk"],
-        rows,
+    rows = []
+    for name, speeds in summary["robustness"].items():
+        median, least = np.median(speeds), np.quantile(speeds, 0.1)
+        rows.append([GAIT_NAMES[name], f"{median:.1f}", f"{least:.1f}", f"{100 * standing[name]:.0f} %"])
+    columns = ["gait", "median, mm/s", "nine in ten reach, mm/s", "do not walk"]
+    caption = (
         f"Each gait on {robots} variants of the completed model, every parameter with 2 % relative spread (one "
-        "standard deviation).",
+        "standard deviation)."
     )
     charts: list[Chart] = [walks_chart(list(walks.values())), robustness_chart(summary["robustness"], GAIT_NAMES)]
-    return ChartedSection("The gaits", said, [table], charts)
+    return ChartedSection("The gaits", said, [PageTable(columns, rows, caption)], charts)
 
 
 _ENDING_TEXT = {
@@ -260,15 +246,14 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
         "completed model for robots whose parameters differ by 2 %; later gaits are sought for what is known of this "
         "robot, and so are nearer the edge beyond which it does not walk. Between rounds the walks are added to the "
         "data, the diagnosis is repeated with all data, and the next round walks the gait of the resulting model.",
-        *(f"Round {number}: {_round_words(one)}." for number, one in enumerate(rounds, 1)),
+        *(
+            f"Round {number}: the model includes {' and '.join(map(effect_words, one['effects'])) or 'no effect'}; "
+            f"its gait is {gait_words(one['gait'])}."
+            for number, one in enumerate(rounds, 1)
+        ),
         f"The rounds ended after round {len(rounds)}: {_ENDING_TEXT[rounds[-1]['ended']]}.",
     ]
     return ChartedSection("Gaits that were not fitted", said, [PageTable(columns, rows, caption)])
-
-
-def _round_words(one: Mapping[str, Any]) -> str:
-    added = " and ".join(effect_words(name) for name in one["effects"]) or "no effect"
-    return f"the model includes {added}; its gait is {gait_words(one['gait'])}"
 
 
 def speed_table(gaits: Sequence[Mapping[str, Any]]) -> PageTable:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from bifa.gait.settling import STANDING_MM_S
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
 from bifa.report.words import channel_words, experiment_words
 
 BASE, COMPLETED = "base model", "completed model"
 MODEL_KEYS = (Key(BASE, "before"), Key(COMPLETED, "after"))
-STANDING_MM_S = 0.5  # a robot that is slower slips in place
 _ROW_PX = 34
 _QUANTITIES = ("force", "displacement", "pressure")
 _COLORS = ("quiet", "before", "after")  # one per gait
@@ -52,31 +52,21 @@ def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | No
         len(pairs) * _ROW_PX / 150,
     )
     keys = [Key(BASE, "before", "dots"), Key(COMPLETED, "after", "dots")]
-    return Chart(
-        [Column([panel])],
-        keys,
-        alt,
-        f"No model can predict better than runs of the same condition agree: {floor:.2f} on held-out trials."
-        if floor
-        else "",
-        across=1,
-    )
+    best = "No model can predict better than runs of the same condition agree:"
+    return Chart([Column([panel])], keys, alt, f"{best} {floor:.2f} on held-out trials." if floor else "", across=1)
 
 
 def learnt_chart(curve: Mapping[str, Any]) -> Chart:
     """Plot a curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
-    # A row is a direction, not a chamber.
-    colors = ("ink", "after", "before", "quiet")
-    rows = {row or "learnt": np.asarray(values, float) for row, values in curve["rows"].items()}
-    series = [
-        Series((row,), np.linspace(curve["lower"], curve["upper"], len(values)), values, colors[i % 4])
-        for i, (row, values) in enumerate(rows.items())
-    ]
-    unit = curve["unit"]
-    panel = Panel(
-        series, Axis(curve["variable"]), Axis(f"added, {unit}" if unit else "added"), [("y", 0.0, "")], height=1.2
-    )
-    keys = [Key(row, colors[i % 4]) for i, row in enumerate(rows)] if len(rows) > 1 else []
+    series, keys = [], []
+    for number, (row, values) in enumerate(curve["rows"].items()):
+        color = ("ink", "after", "before", "quiet")[number % 4]  # a row is a direction, not a chamber
+        x = np.linspace(curve["lower"], curve["upper"], len(values))
+        series.append(Series((row or "learnt",), x, np.asarray(values, float), color))
+        keys.append(Key(row or "learnt", color))
+    added = Axis(f"added, {curve['unit']}" if curve["unit"] else "added")
+    panel = Panel(series, Axis(curve["variable"]), added, [("y", 0.0, "")], height=1.2)
+    keys = keys if len(keys) > 1 else []
     return Chart([Column([panel])], keys, f"What was learnt: {curve['term']} over {curve['variable']}", across=1)
 
 
@@ -116,13 +106,10 @@ def _residual_column(trace: Mapping[str, Any]) -> Column:
         Series((key,), *thinned(trace["time_s"], trace[side], 240), color)
         for key, side, color in ((BASE, "before", "before"), (COMPLETED, "after", "after"))
     ]
-    title = f"{_label(trace)}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
+    # records of earlier versions have only the trial's file
+    label = trace.get("label") or trace["trial"].removesuffix(".csv").replace("_", " ")
+    title = f"{label}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
     return Column([Panel(series, Axis("time, s"), Axis("noise sd"))], title)
-
-
-def _label(trace: Mapping[str, Any]) -> str:
-    """Return the trial's label; records of earlier versions have only its file."""
-    return trace.get("label") or trace["trial"].removesuffix(".csv").replace("_", " ")
 
 
 def _size(trace: Mapping[str, Any]) -> float:
