@@ -118,12 +118,16 @@ class Passage:
     inclination_deg: float = 0.0
     clock: float = 1.0
     dead_time_s: float = 0.0
-    settled: float = 0.0
 
     @property
     def terrain(self) -> np.ndarray:
         """The tunnel, 10 cm ahead of the head."""
         return terrain(tunnel())
+
+    @property
+    def settled(self) -> float:
+        """No walk ends early."""
+        return 0.0
 
     def finer(self) -> "Passage":
         """Return the metric for finalists: a smaller step."""

@@ -66,7 +66,6 @@ _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004))
 # on others. Copies slower by these fractions follow.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
-_SOONER = 5.0  # how much more than in the check successive cycles of a walk that counts as settled may differ
 _BASINS, _STARTS = 24, 8  # explored gaits where climbs on robots start; those to refine if there were no climbs
 _MIN_SPACING, _WIDE_SPACING = 0.003, 0.02  # minimum distance between finalists, on some axis of the unit cube
 # Climbs on robots: how many families to start from, and the shares of the best value that these, and the end points of
@@ -167,8 +166,7 @@ class SearchRun:
         """Return the objective of a round, on robots of its own."""
         settings = self.settings
         draws = self.robots(stage.draws, settings.seed + 500_000 * number)
-        metric = settings.metric.in_full()
-        metric = replace(metric, tolerance_m=stage.tolerance_m, settled=_SOONER * metric.settled)
+        metric = replace(settings.metric.in_full(), tolerance_m=stage.tolerance_m)
         share = stage.quantile * settings.share / QUANTILE
         nominal, space = plant(self.model), settings.space
         return RobustSpeed(self.runs, nominal, draws, space, metric, share, stage.abandon, stage.jitter)
