@@ -1,6 +1,7 @@
 """Stiffness and area from static loading, on data whose curve is not the model's."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import chebyshev
 from scipy.signal import savgol_filter
 
+from bifa import Robot
 from bifa.data import Dataset
 from bifa.errors import BifaError
 from bifa.identify.doubts import assumed_curves
@@ -178,3 +180,16 @@ def test_a_curve_that_is_needed_but_not_determined_is_told(measured, assumed):
     day = bench(IndependentLab().with_seed(5), *measured, repeats=2)
     told = assumed_curves(prepare(day))
     assert [line.partition(" actuator")[0].rpartition(" ")[2] for line in told] == assumed
+
+
+def test_a_diagnosis_from_python_tells_it_before_its_own_warnings(monkeypatch):
+    @dataclass(frozen=True)
+    class Found:
+        base: object
+        warnings: tuple[str, ...]
+
+    found = Found(SimpleNamespace(problem=SimpleNamespace(floor=SimpleNamespace(channels={}))), ("the engine's",))
+    monkeypatch.setattr("lacuna.diagnose", lambda system, seed: SimpleNamespace(diagnosis=found))
+    monkeypatch.setattr("lacuna.Verdict", lambda system, diagnosis: diagnosis)
+    verdict = Robot().diagnose(bench(IndependentLab().with_seed(5), "small", (8.0,), repeats=2))
+    assert [line.startswith("There is no static_loading of the small") for line in verdict.warnings] == [True, False]
