@@ -100,17 +100,17 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 class RoundSteps:
     """The steps of a round.
 
-    complete(dataset, suspected): diagnose all data, suspecting the effects named before; returns the completed model
-    and the effects named. optimize(model, walked): return its gait, starting also from those walked before, or None if
+    complete(dataset, suspected): diagnose all data, suspecting the effects that the model had before; returns the
+    completed model. optimize(model, walked): return its gait, starting also from those walked before, or None if
     the model expects it not to walk. walk(number, model, gait, folder): walk it into a data set; rounds count from 2.
     """
 
-    complete: Callable[[Dataset, tuple[str, ...]], tuple[Model, tuple[str, ...]]]
+    complete: Callable[[Dataset, tuple[str, ...]], Model]
     optimize: Callable[[Model, tuple[Gait, ...]], Gait | None]
     walk: Callable[[int, Model, Gait, Path], Dataset]
 
 
-def judged(model: Model, effects: tuple[str, ...], walks: Dataset, at_edge: bool = False) -> Round:
+def judged(model: Model, walks: Dataset, at_edge: bool = False) -> Round:
     """Judge how well `model` predicts the repeats of one gait."""
     trials = walks.trials
     prediction = prediction_of(model, trials[0])
@@ -120,7 +120,7 @@ def judged(model: Model, effects: tuple[str, ...], walks: Dataset, at_edge: bool
     floor = float(np.sqrt((between**2).sum(axis=0).mean() / (len(trials) - 1))) if several else None
     measured = [speed_of(trial).mean_mm_s for trial in trials]
     return Round(
-        effects,
+        tuple(model.effects),
         trials[0].walked,
         prediction.speed_mm_s,
         float(np.mean(measured)),
@@ -145,7 +145,7 @@ def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
     return np.array(measured) - predicted
 
 
-def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...], steps: RoundSteps) -> None:
+def again(inputs: Path, outputs: Path, dataset: Dataset, steps: RoundSteps) -> None:
     """Repeat rounds until a gait at the edge is predicted, nothing changes, no gait is expected to walk, or `ROUNDS` is
     reached.
 
@@ -161,14 +161,14 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     dataset = joined(dataset, before, "walks-1/")
     began = tuple({Gait(**trial.walked): None for trial in before.trials})
     (outputs / "rounds").mkdir(exist_ok=True)
-    rounds = [judged(model, effects, walks)]
+    rounds = [judged(model, walks)]
     while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
-        completed, named = steps.complete(dataset, effects)
-        # If nothing is named any more, the fits have gone wrong: the effects that explained the bench data are kept.
-        if effects and not named:
-            completed, named = model, effects
+        completed = steps.complete(dataset, tuple(model.effects))
+        # If no effect is left, the fits have gone wrong: the model that explained the bench data is kept.
+        if model.effects and not completed.effects:
+            completed = model
         folder = outputs / "rounds" / f"walks-{number}"
         if folder.exists():
             walks = read_dataset(folder)
@@ -179,8 +179,8 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
         else:
             ended = Ending.FALLS
             break
-        model, effects = completed, named
-        rounds.append(judged(model, effects, walks, at_edge=True))
+        model = completed
+        rounds.append(judged(model, walks, at_edge=True))
     rounds[-1] = replace(rounds[-1], ended=ended)
     save_model(outputs / "model-last.toml", model)
     fastest = found[int(np.argmax([one.measured_mm_s for one in rounds]))]

@@ -210,9 +210,8 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
 
 
 def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: OnProgress) -> Stage:
-    def complete(dataset: Dataset, suspected: tuple[str, ...]) -> tuple[Model, tuple[str, ...]]:
-        found = _run_diagnosis(setup, on_progress, dataset, suspected)
-        return completed_model(found.final), tuple(effect.name for effect in found.effects)
+    def complete(dataset: Dataset, suspected: tuple[str, ...]) -> Model:
+        return completed_model(_run_diagnosis(setup, on_progress, dataset, suspected).final)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
@@ -224,12 +223,11 @@ def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: 
         dataset = read_dataset(inputs / "bench")
         for folder in sorted((inputs / "separating").iterdir()):
             dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
-        named = json.loads((inputs / "diagnosis.json").read_text())["effects"]
         steps = RoundSteps(complete, lambda robot, walked: gait_at_edge(robot, setup.seed, on_progress, walked), walk)
-        again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), steps)
+        again(inputs, outputs, dataset, steps)
 
     walked = ("walks-base", "walks-completed")
-    needs = ("bench", "separating", *walked, "diagnosis.json", "model-completed.toml", "gait-completed.toml")
+    needs = ("bench", "separating", *walked, "model-completed.toml", "gait-completed.toml")
     makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
     settings = setup.settings(_ROUND_STAGE) | {"effort": asdict(effort)}
     kept = not setup.is_virtual
