@@ -31,6 +31,7 @@ class Simulations:
             terrain=metric.terrain,
             dead_time_s=metric.dead_time_s * metric.clock,
             settled=metric.settled,
+            looser=metric.looser,
             workers=self._workers,
             executor=self._executor,
         )

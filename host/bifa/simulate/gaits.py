@@ -53,12 +53,14 @@ def speeds(
     terrain: np.ndarray = rigs.CLEAR,
     dead_time_s: float = 0.0,
     settled: float = 0.0,
+    looser: float = 1.0,
     workers: int | None = None,
     executor: Executor | None = None,
 ) -> Advance:
     """Simulate gaits (n, 6), all with one model or each with its own of n models; arrays have shape (n, cycles).
     `dead_time_s`: how long the Uno vents a chamber when switching between supplies. `settled`: if not 0, a walk ends
     once the advance of a cycle and those of the two before agree to within this share, and the other cycles repeat it.
+    `looser`: by this factor the small actuators' states may err more than where their pressures are read.
 
     Runs on `executor`, or else in `workers` threads (by default one per core) without the GIL. Rows are dealt out in
     turn, since gaits differ in cost and neighbors are alike. Angles need not be within 0-360.
@@ -74,7 +76,7 @@ def speeds(
     shares = [slice(first, None, pieces) for first in range(min(pieces, n))]
     if executor is None and len(shares) > 1:
         executor = _pool(count)
-    run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s, settled)
+    run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s, settled, looser)
     each: Callable[..., Any] = executor.map if executor else map
     found = each(run, [flats[share] for share in shares], [gaits[share] for share in shares])
     advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
@@ -90,11 +92,12 @@ def _progress(
     terrain: np.ndarray,
     dead_time_s: float,
     settled: float,
+    looser: float,
     flats: Sequence[Plant],
     gaits: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Advance and slip in each cycle, each of shape (n, cycles)."""
-    ways = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
+    ways = [rigs.pipe(flat, inclination_deg, terrain, looser=looser) for flat in flats]
     ends = gaits[:, :1] * np.arange(1, cycles + 1)
     switches = gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)
     what = lanes.Experiment(lanes.PROGRESS, ways, switches, list(ends), tolerance_m, settled=settled)

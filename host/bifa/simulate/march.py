@@ -24,6 +24,7 @@ from bifa.simulate.stepper import (
     V_SMALL_HEAD,
     V_TAIL,
     X_HEAD,
+    X_SMALL_HEAD,
     X_TAIL,
     gravity_of,
     sources,
@@ -179,7 +180,7 @@ def attempt(plant, rig, run, until, tolerance):
         return
     error = 0.0
     for i in range(STATES):
-        error = max(error, abs(halves[i] - whole[i]) * _SHARES[i])
+        error = max(error, abs(halves[i] - whole[i]) * (_SHARES[i] if i < X_SMALL_HEAD else _SHARES[i] / rig.looser))
     error = max(error, _cut_short(y, first, h))
     smooth = kind == kind_first and kind == kind_second
     error = worst(run, error / (tolerance if smooth else _ABRUPT * tolerance))

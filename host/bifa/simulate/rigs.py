@@ -20,7 +20,7 @@ class SimulationError(BifaError):
     """A requested simulation is impossible; the text says why."""
 
 
-def pipe(plant: Plant, inclination_deg: float = 0.0, terrain: np.ndarray = CLEAR) -> Mounting:
+def pipe(plant: Plant, inclination_deg: float = 0.0, terrain: np.ndarray = CLEAR, *, looser: float = 1.0) -> Mounting:
     """The whole robot in a pipe; a positive inclination is uphill."""
     if not -90.0 <= inclination_deg <= 90.0:
         raise SimulationError(f"inclination_deg = {inclination_deg:g} is outside its range -90 to 90")
@@ -29,6 +29,7 @@ def pipe(plant: Plant, inclination_deg: float = 0.0, terrain: np.ndarray = CLEAR
         parts=HAS_BODY | HAS_HEAD | HAS_TAIL,
         free=0,
         wall=1,
+        looser=looser,
         incline_rad=math.radians(inclination_deg),
         positive_psi=plant.q[layout.SUPPLY_POSITIVE],
         negative_psi=plant.q[layout.SUPPLY_NEGATIVE],
@@ -44,14 +45,14 @@ def stand(plant: Plant, actuator: str, positive_psi: float) -> Mounting:
     small = plant.q[layout.SMALL + layout.VOLUME]
     parts = HAS_BODY if actuator == "large" else HAS_HEAD
     shares, vacuum = np.array([1.0, small, small]), plant.q[layout.SUPPLY_NEGATIVE]
-    return Mounting(parts, 1, 0, 0.0, _pressure(positive_psi), vacuum, shares, CLEAR)
+    return Mounting(parts, 1, 0, 1.0, 0.0, _pressure(positive_psi), vacuum, shares, CLEAR)
 
 
 def anchor(plant: Plant, pressure_psi: float) -> Mounting:
     """A head segment in the pipe."""
     segment = _SMALL_ACTUATORS * plant.q[layout.SMALL + layout.VOLUME]
     shares, vacuum = np.array([1.0, segment, segment]), plant.q[layout.SUPPLY_NEGATIVE]
-    return Mounting(HAS_HEAD, 1, 1, 0.0, _pressure(pressure_psi), vacuum, shares, CLEAR)
+    return Mounting(HAS_HEAD, 1, 1, 1.0, 0.0, _pressure(pressure_psi), vacuum, shares, CLEAR)
 
 
 def _pressure(value: float) -> float:

@@ -58,7 +58,15 @@ def under_vacuum(plant, rig, run):
 @kernel
 def _supplied(rig, positive_psi):
     return Mounting(
-        rig.parts, rig.free, rig.wall, rig.incline_rad, positive_psi, rig.negative_psi, rig.share, rig.terrain
+        rig.parts,
+        rig.free,
+        rig.wall,
+        rig.looser,
+        rig.incline_rad,
+        positive_psi,
+        rig.negative_psi,
+        rig.share,
+        rig.terrain,
     )
 
 

@@ -39,13 +39,15 @@ class Mounting(NamedTuple):
     """How the robot, or a part of it, is mounted and supplied.
 
     `parts`: HAS_ bits. `free` = 1: the body's smaller end moves freely and the other is clamped (step response).
-    `wall` = 0: no pipe around the small actuators. `terrain`: see `bifa.simulate.terrain`; empty for a clear pipe.
-    `share`: (3,) volumes of the body, head and tail chambers, as seen by a supply, over the body's.
+    `wall` = 0: no pipe around the small actuators. `looser`: factor on the tolerance of their states, 1 if their
+    pressures are read. `terrain`: see `bifa.simulate.terrain`; empty for a clear pipe. `share`: (3,) volumes of the
+    body, head and tail chambers, as seen by a supply, over the body's.
     """
 
     parts: int
     free: int
     wall: int
+    looser: float
     incline_rad: float
     positive_psi: float
     negative_psi: float

@@ -96,7 +96,9 @@ def test_the_papers_observation_the_slow_gait_passes_the_tunnel_and_the_fast_one
     """Section VI.B: 6 s gaits get through, the optimised one does not bend the supports."""
     passage = Passage()
     rows = np.array([[6.0, 270, 90, 0.5, 0.5, 0.5], [2.516, 208.94, 331.87, 0.6491, 0.4425, 0.4425]])
-    slow, fast = passage.judge(speeds(nominal_plant, rows, passage.cycles, terrain=passage.terrain)).counted_mm_s
+    slow, fast = passage.judge(
+        speeds(nominal_plant, rows, passage.cycles, terrain=passage.terrain, looser=passage.looser)
+    ).counted_mm_s
     assert slow > 5.0
     assert fast == 0.0
     # The search takes the tunnel into account too.

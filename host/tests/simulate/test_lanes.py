@@ -152,8 +152,11 @@ def test_lanes_with_switches_and_samples_of_their_own(found):
         TOLERANCE_M,
     )
     got = found[0].march(plants, what, False)
-    for k, rows in enumerate(got):
+    loosely = replace(what, rigs=[rigs.pipe(p, looser=10.0) for p in plants])
+    for k, (rows, rough) in enumerate(zip(got, found[0].march(plants, loosely, False), strict=True)):
         np.testing.assert_allclose(rows, lanes.in_numba(what, k, plants[k]), atol=1e-7)
+        np.testing.assert_allclose(rough, lanes.in_numba(loosely, k, plants[k]), atol=1e-7)
+        assert 0.0 < np.abs(rough - rows).max() < 1e-4
 
 
 def test_a_walk_that_has_settled_is_extrapolated_and_one_that_has_not_is_simulated(found):

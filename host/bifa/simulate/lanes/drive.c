@@ -18,7 +18,7 @@ typedef struct {
 typedef struct {
     int64_t parts, free, wall, terrain_columns, curve_rows, learnt_terms, learnt_columns, experiment, together;
     const double *terrain;
-    double extended_psi, rate_m_s, load_cell_N_m, tolerance_m, settled;
+    double extended_psi, rate_m_s, load_cell_N_m, tolerance_m, settled, looser;
 } Setting;
 
 enum { WALK, SEEN, PROGRESS, STEP, ANCHOR };
@@ -82,6 +82,7 @@ static void mount(Bench *bench, const Setting *setting, const Job *job, int i) {
     rig->parts = setting->parts;
     rig->free = setting->free;
     rig->wall = setting->wall;
+    rig->looser = setting->looser;
     rig->terrain = (Terrain){setting->terrain, setting->terrain ? 7 : 0, setting->terrain_columns};
     set_lane(&rig->incline_rad, i, job->incline_rad);
     set_lane(&rig->positive_psi, i, job->positive_psi);

@@ -43,7 +43,7 @@ class _Setting(ctypes.Structure):
         *_fields("parts free wall terrain_columns curve_rows learnt_terms learnt_columns", ctypes.c_int64),
         *_fields("experiment together", ctypes.c_int64),
         ("terrain", ctypes.c_void_p),
-        *_fields("extended_psi rate_m_s load_cell_N_m tolerance_m settled", ctypes.c_double),
+        *_fields("extended_psi rate_m_s load_cell_N_m tolerance_m settled looser", ctypes.c_double),
     ]
 
 
@@ -138,6 +138,7 @@ def _jobs(plants: Sequence[Plant], rigs: Sequence[Mounting]) -> tuple[np.ndarray
         parts=rig.parts,
         free=rig.free,
         wall=rig.wall,
+        looser=rig.looser,
         terrain=_address(terrain) if len(terrain) else None,
         terrain_columns=terrain.shape[1],
         curve_rows=len(plants[0].body_curve),

@@ -23,6 +23,7 @@ _SHAPES = Shapes(
         "Plant": {"q": "F[]", "active": "Active", "body_curve": "Curve", "small_curve": "Curve", "learnt": "Learnt"},
         "Mounting": {
             **{name: "i" for name in ("parts", "free", "wall")},
+            "looser": "f",
             **{name: "F" for name in ("incline_rad", "positive_psi", "negative_psi")},
             "share": "F[]",
             "terrain": "Terrain",

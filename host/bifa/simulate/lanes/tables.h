@@ -41,6 +41,7 @@ typedef struct {
 
 typedef struct {
     long parts, free, wall;
+    double looser;
     V incline_rad, positive_psi, negative_psi, share[3];
     Terrain terrain;
 } Mounting;
