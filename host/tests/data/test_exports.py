@@ -226,6 +226,11 @@ READ = {
         "[instrument.machine]\n" + COMMAS + "sign = { force_N = -1 }\n",
         [[0.0, 0.1], [1.5, 1.6], [2.5, 2.4]],
     ),
+    "a logger that pads its numbers after the sign (Graphtec)": (
+        't,x,F\n"+  0","+   1.5","-  2.500"\n"+  1","- 11.5","+ 12.500"\n',
+        SIMPLE,
+        [[0.0, 1.0], [1.5, -11.5], [-2.5, 12.5]],
+    ),
     "a column's name alone is no unit": (
         "t,x,N\n0,1,2\n1,2,3\n",
         SIMPLE.replace('"N"', '"kN"').replace('"F"', '"N"'),

@@ -182,9 +182,14 @@ def test_any_decimal_reads_back_as_python_wrote_it(value):
     assert decimal(repr(value)) == value == decimal(f" {value!r}\t")
 
 
+@pytest.mark.parametrize(("cell", "value"), [("+   0.020", 0.02), ("- 10.5e-1", -1.05), ("1 000", None), ("- ", None)])
+def test_loggers_pad_between_the_sign_and_the_digits(cell, value):
+    assert decimal(cell) == value
+
+
 @given(st.text(max_size=8))
 def test_what_is_no_plain_decimal_is_no_number(text):
-    assert decimal(text) is None or set(text.strip(" \t")) <= set("0123456789+-.eE")
+    assert decimal(text) is None or set(text.strip(" \t")) <= set("0123456789+-.eE \t")
 
 
 def test_truths_are_one_and_zero(tmp_path):
