@@ -25,7 +25,7 @@ from bifa.simulate import Plant, gait_rows, plant
 OnProgress = Callable[[str, float, float], None]
 
 VERIFYING_DRAWS = 1024  # robots, none used in the search, on which the chosen gait is evaluated
-_NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 4
+_NOMINAL_FINALISTS, _SLOWED, _ROBUST_FINALISTS = 60, 15, 4
 # Default budgets. That of cma is an upper limit, for landscapes with many basins: it stops once its best runs agree.
 # Robust searches get a quarter, because the gaits fastest on the model are only their starting points.
 EVALUATIONS = {"cma": 8000, "de": 4000, "bo": 1000}
@@ -338,15 +338,16 @@ def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]
 
 def _fastest_finalist(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:
     """Return the fastest finalist by the finer metric, with its speed. Many fail, because the fastest gaits are at a
-    cliff; if none reaches half of the best explored value, finalists further apart and then slower copies are tried."""
+    cliff; if none keeps `_ACCEPT_RATIO` of the best explored value, finalists further apart and then slower copies are
+    tried."""
     space, rows, speeds = search.settings.space, np.empty((0, 6)), np.empty(0)
     near, far = (explored.finalists(_NOMINAL_FINALISTS, apart=apart) for apart in (_MIN_SPACING, _WIDE_SPACING))
-    slower = np.concatenate([space.slower(points, share) for points in (near, far) for share in _SLOWER])
+    slower = np.concatenate([space.slower(points[:_SLOWED], share) for points in (near, far) for share in _SLOWER])
     for points in (near, far, slower):
         more = space.rows(points)
         rows, speeds = np.vstack([rows, more]), np.append(speeds, search.fine_speeds(more))
         search.on_progress("verify", 0.5, float(speeds.max()))
-        if speeds.max() > _WALK_RATIO * explored.best_value:
+        if speeds.max() > _ACCEPT_RATIO * explored.best_value:
             break
     best = int(np.argmax(speeds))
     if speeds[best] <= 0.0:
