@@ -25,7 +25,8 @@ from bifa.simulate import Plant, gait_rows, plant
 OnProgress = Callable[[str, float, float], None]
 
 VERIFYING_DRAWS = 1024  # robots, none used in the search, on which the chosen gait is evaluated
-_NOMINAL_FINALISTS, _SLOWED, _ROBUST_FINALISTS = 60, 15, 4
+_NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 4
+_SLOWED = 15  # nominal finalists of which slower copies are tried
 # Default budgets. That of cma is an upper limit, for landscapes with many basins: it stops once its best runs agree.
 # Robust searches get a quarter, because the gaits fastest on the model are only their starting points.
 EVALUATIONS = {"cma": 8000, "de": 4000, "bo": 1000}
