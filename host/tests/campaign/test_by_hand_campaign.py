@@ -158,7 +158,6 @@ def folder(tmp_path):
     save_model(folder / "model-completed.toml", SLIPPERY)
     save_gait(folder / "gait-base.toml", BRISK)
     save_gait(folder / "gait-completed.toml", FAST)
-    (folder / "diagnosis.json").write_text('{"effects": []}')
     return folder
 
 
@@ -178,7 +177,8 @@ def walks(lab, folder, said, stop_at=None):
 
 
 def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, monkeypatch):
-    diagnosed = Mock(return_value=SimpleNamespace(effects=[SimpleNamespace(name="stribeck")], final=ROBOT))
+    slightly = ROBOT.with_effects({"hysteresis": {"force_N": 1e-9}})
+    diagnosed = Mock(return_value=SimpleNamespace(final=slightly))
     monkeypatch.setattr(loop, "prepare", lambda dataset: dataset)
     monkeypatch.setattr(loop, "diagnose", diagnosed)
     monkeypatch.setattr(loop, "with_doubts", lambda found, system: found)
@@ -210,7 +210,7 @@ def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, mon
     rounds = json.loads((folder / "rounds.json").read_text())
     fed = [{trial.file for trial in call.args[0].trials} for call in diagnosed.call_args_list]
     assert fed == [{"walk_1.csv", "walks-1/base_1.csv", "walks-1/completed_1.csv"}]
-    assert [(Gait(**one["gait"]), one["effects"]) for one in rounds] == [(FAST, []), (FASTER, ["stribeck"])]
+    assert [(Gait(**one["gait"]), one["effects"]) for one in rounds] == [(FAST, []), (FASTER, ["hysteresis"])]
     assert rounds[0]["error_mm"] > 1.5 * rounds[1]["error_mm"]
     assert rounds[1]["predicted_mm_s"] == pytest.approx(rounds[1]["measured_mm_s"], rel=0.005)
     assert [one["ended"] for one in rounds] == [None, "predicted"]
