@@ -28,7 +28,10 @@ class _Commands(typer.core.TyperGroup):
         try:
             with writable():
                 return super().invoke(ctx)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
+            from bifa.link.leaving import raise_if_unconfirmed
+
+            raise_if_unconfirmed(interrupt)
             typer.echo("\nInterrupted. Finished results are listed above; no partial files remain.", err=True)
             raise typer.Exit(130) from None
 

@@ -105,6 +105,9 @@ def stoppable(kept: Callable[[], str]) -> Iterator[None]:
     """On Ctrl-C, print what was kept, as described by `kept()`, and exit with status 130."""
     try:
         yield
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
+        from bifa.link.leaving import raise_if_unconfirmed
+
+        raise_if_unconfirmed(interrupt)
         typer.echo(f"\nstopped; {kept()}")
         raise typer.Exit(130) from None

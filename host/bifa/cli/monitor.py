@@ -50,6 +50,7 @@ def monitor(
     check_port(port)
 
     from bifa.link import Uno
+    from bifa.link.leaving import raise_if_unconfirmed
     from bifa.live.monitor import watch
     from bifa.rig import SameBoard, open_rig
     from bifa.robot import load_model, nominal
@@ -82,5 +83,6 @@ def monitor(
         with served(page, _WEB_PORT if web_port is None else web_port) as address:
             say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
             fly(pilot, SameBoard(port), page.tell, say, seconds, begin)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
+        raise_if_unconfirmed(interrupt)
         typer.echo("valves off")

@@ -41,6 +41,7 @@ def upload(
     check_port(port)
 
     from bifa.link import Uno
+    from bifa.link.leaving import raise_if_unconfirmed
     from bifa.live.walk import walk
     from bifa.rig import open_rig
     from bifa.robot.gait import read_gait_file
@@ -57,7 +58,8 @@ def upload(
                 if run:
                     console.print("walking; Ctrl-C ends" if seconds is None else f"walking for {seconds:g} s")
                     walk(uno, rig.clock, seconds, shown.update)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
+            raise_if_unconfirmed(interrupt)
             if not run:
                 raise
         if run:

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from types import CodeType, FrameType
 from typing import Any, ParamSpec, Protocol, TypeVar
 
-from bifa.link.errors import NoAnswerError, RestartedError
+from bifa.link.errors import NoAnswerError, RestartedError, StillMovingError
 from bifa.link.frames import Report
 from bifa.link.session import Session
 from bifa.link.table import STATES
@@ -181,6 +181,16 @@ def _interrupt_main_thread() -> None:
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
     else:
         signal.raise_signal(signal.SIGINT)
+
+
+def raise_if_unconfirmed(interrupt: KeyboardInterrupt) -> None:
+    """Raise the StillMovingError that `interrupt` replaced, if any: a Ctrl-C during the clean-up after an unconfirmed
+    stop must not hide it. Whoever ends on a KeyboardInterrupt calls this first."""
+    replaced = interrupt.__context__
+    while replaced is not None:
+        if isinstance(replaced, StillMovingError):
+            raise replaced from interrupt
+        replaced = replaced.__context__
 
 
 def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> Report:

@@ -16,6 +16,7 @@ from rich.status import Status
 
 from bifa.errors import BifaError
 from bifa.link import RefusedError, Sample, Uno
+from bifa.link.leaving import raise_if_unconfirmed
 from bifa.link.table import CHAMBERS, MARK_PAUSE
 from bifa.live.rounds import Absence
 from bifa.live.walk import raise_if_no_reader, stopped_text
@@ -101,8 +102,9 @@ def record_telemetry(
             while time.monotonic() < end_s:
                 with log.absence.waited_out():
                     log.record_until_gone()
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
         console.print("ended")
+        raise_if_unconfirmed(interrupt)
     if log.absence.unconfirmed is not None:
         raise log.absence.unconfirmed
     console.print(f"{out} holds the telemetry; a data set also needs the displacement from your own instrument")

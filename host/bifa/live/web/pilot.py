@@ -14,6 +14,7 @@ from typing import Any
 
 from bifa.errors import BifaError
 from bifa.link import Clock, LinkError, RefusedError, Sample, StillMovingError, Uno
+from bifa.link.leaving import raise_if_unconfirmed
 from bifa.link.table import CHAMBERS
 from bifa.live.cycle_speed import CycleSpeed
 from bifa.live.rounds import Absence, Latest, Pace
@@ -366,7 +367,8 @@ def fly(
                 uno, came_back = Uno(rig.transport, rig.clock), _CAME_BACK if told else ""
                 pilot.fly(uno, rig.clock, tell, length_s, take_off, position_mm, came_back)
                 return
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
+        raise_if_unconfirmed(interrupt)
         if absence.unconfirmed is None:
             raise
     if absence.unconfirmed is not None:
