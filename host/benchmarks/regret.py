@@ -1,7 +1,7 @@
 """Regret of gait searches against the best known gait, by robot and seed.
 
     python -m benchmarks.regret [--robots 60] [--seeds 5] [--long 5] [--fully 60] [--models DIR]
-                               [--records FILE] [--print]
+                               [--records FILE] [--earlier FILE] [--print]
 
 Robots: the nominal one and the strong push, then specimens (5 % in every parameter) with each effect of the library at
 its usual size in turn, every tenth in a vertical pipe and every tenth before the tunnel; and every model-last.toml
@@ -10,7 +10,8 @@ known gait of a robot is the best of all its runs: of every seed, of `--long` se
 of the peers (differential evolution, SciPy's DIRECT and SHGO) with as many evaluations as the search took on average.
 (nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) Robust searches and
 peers take ten times as long as nominal searches: `--fully` sets on how many of the robots, evenly spread, they are
-run. FILE has one line per robot, with which a run resumes that was interrupted or searched fewer robots fully.
+run. FILE has one line per robot, with which a run resumes that was interrupted, had fewer seeds or searched fewer
+robots fully. The speeds in the FILE of an earlier search count among the best known in place of long runs and peers.
 """
 
 from __future__ import annotations
@@ -79,21 +80,22 @@ def searched(
     fully: bool = True,
 ) -> dict[str, Any]:
     """Complete `record`: speeds of each seed, nominal and robust, of the long runs and of the peers; processor seconds
-    per search, and the mean number of evaluations of a nominal one, which is also the peers' budget. Not `fully`: only
-    the nominal searches.
+    per search, and the mean number of evaluations of the first nominal ones, which is also the peers' budget. Not
+    `fully`: only the nominal searches.
     """
     record, spread = dict(record), None if model.covariance else SPREAD
     for kind, robust in (("nominal", False), ("robust", True))[: 1 + fully]:
-        if kind in record:
-            continue
-        start = time.process_time()
-        own = [_found(model, replace(settings, robust=robust, seed=seed, spread=spread), runs) for seed in seeds]
-        record[kind] = [speed for speed, _ in own]
-        record[f"{kind}_s"] = (time.process_time() - start) / len(seeds)
-        if not robust:
-            record["evaluations"] = round(mean(evaluations for _, evaluations in own)) or EVALUATIONS["cma"]
-        more = replace(settings, robust=robust, evaluations=_LONGER * EVALUATIONS["cma"], spread=spread)
-        record[f"{kind}_long"] = [_found(model, replace(more, seed=1000 + k), runs)[0] for k in range(long)]
+        done = record.get(kind, [])
+        if left := seeds[len(done) :]:
+            start = time.process_time()
+            own = [_found(model, replace(settings, robust=robust, seed=seed, spread=spread), runs) for seed in left]
+            spent_s = time.process_time() - start + len(done) * record.get(f"{kind}_s", 0.0)
+            record[kind] = [*done, *(speed for speed, _ in own)]
+            record[f"{kind}_s"] = spent_s / len(seeds)
+            record.setdefault("evaluations", round(mean(tried for _, tried in own)) or EVALUATIONS["cma"])
+        if f"{kind}_long" not in record:
+            more = replace(settings, robust=robust, evaluations=_LONGER * EVALUATIONS["cma"], spread=spread)
+            record[f"{kind}_long"] = [_found(model, replace(more, seed=1000 + k), runs)[0] for k in range(long)]
     budget = record["evaluations"]
     if fully and "de" not in record:
         record["de"] = _found(model, replace(settings, robust=False, method="de", evaluations=budget), runs)[0]
@@ -101,6 +103,12 @@ def searched(
         if fully and name not in record:
             record[name] = peer(minimize, model, settings, budget, runs)
     return record
+
+
+def known_before(record: dict[str, Any]) -> dict[str, Any]:
+    """Begin the record of a robot that an earlier search has a `record` of: whatever that found is known."""
+    known = {f"{kind}_long": record[kind] + record[f"{kind}_long"] for kind in ("nominal", "robust") if kind in record}
+    return {name: record[name] for name in ("robot", "evaluations", "de", *PEERS) if name in record} | known
 
 
 def _found(model: Model, settings: Settings, runs: Simulations) -> tuple[float, int]:
@@ -179,10 +187,12 @@ def run(
     kept: Path | None = None,
     only_print: bool = False,
     every: int | None = None,
+    earlier: Path | None = None,
 ) -> dict[str, float]:
     """Print the table, a line as each robot ends; return the figures flat. Ctrl-C ends with a summary of those done.
-    `every`: how many of the robots are searched fully; None: all."""
+    `every`: how many of the robots are searched fully; None: all. `earlier`: records of an earlier search."""
     known = lines.read(kept, "robot")
+    before = {name: known_before(record) for name, record in lines.read(earlier, "robot").items()}
     print(HEADING)
     found: list[dict] = []
     asked = list(robots(count, models))
@@ -192,7 +202,7 @@ def run(
             for number, (name, model, settings) in enumerate(asked):
                 if only_print and name not in known:
                     continue
-                record = known.setdefault(name, {"robot": name})
+                record = known.setdefault(name, before.get(name, {"robot": name}))
                 if not only_print:
                     fully = number * every // len(asked) > (number - 1) * every // len(asked)
                     known[name] = searched(record, model, settings, range(seeds), long, runs, fully)
@@ -226,11 +236,13 @@ def main() -> None:
     parser.add_argument("--fully", type=int, help="number of robots with robust searches and peers; default: all")
     parser.add_argument("--models", type=Path, help="folder whose model-last.toml files are searched as well")
     parser.add_argument("--records", type=Path, help="one line of JSON per robot; read first, then kept up to date")
+    parser.add_argument("--earlier", type=Path, help="records of an earlier search, whose speeds count among the known")
     parser.add_argument("--print", action="store_true", help="only print what is in the records")
     options = parser.parse_args()
     if options.print and options.records is None:
         parser.error("--print needs the records to print: add --records FILE")
-    run(options.robots, options.seeds, options.long, options.models, options.records, options.print, options.fully)
+    kept, earlier = options.records, options.earlier
+    run(options.robots, options.seeds, options.long, options.models, kept, options.print, options.fully, earlier)
 
 
 if __name__ == "__main__":

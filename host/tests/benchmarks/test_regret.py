@@ -21,6 +21,7 @@ RECORD = {
     "direct": 11.0,
     "shgo": 12.0,
 }
+FOUND = Mock(nominal_mm_s=20.0, quantile_mm_s=20.0, evaluations=100)
 
 
 def test_regret_is_against_the_best_of_all_runs_and_peers():
@@ -43,6 +44,24 @@ def test_what_a_record_has_is_not_searched_again(monkeypatch):
     assert regret.searched(lacking, nominal(), Settings(), range(2), 1, None) == RECORD | {"shgo": 14.0}
     judge.assert_called_once()
     assert "shgo" not in lacking
+
+
+def test_only_seeds_that_a_record_lacks_are_searched(monkeypatch):
+    monkeypatch.setattr(regret, "optimize", search := Mock(return_value=FOUND))
+    record = regret.searched(RECORD, nominal(), Settings(), range(3), 1, None)
+    asked = [call.args[2] for call in search.call_args_list]
+    assert [(settings.robust, settings.seed) for settings in asked] == [(False, 2), (True, 2)]
+    assert (record["nominal"], record["robust"]) == ([23.0, 22.0, 20.0], [21.0, 21.0, 20.0])
+    assert 0.0 < record["robust_s"] < 5.0
+
+
+def test_an_earlier_search_tells_of_the_best_known_gait_only(monkeypatch):
+    monkeypatch.setattr(regret, "optimize", Mock(return_value=FOUND))
+    begun = regret.known_before(RECORD)
+    assert regret.regrets(begun) == []
+    record = regret.searched(begun, nominal(), Settings(), range(1), 1, None)
+    assert (record["nominal_long"], record["evaluations"], record["de"]) == ([23.0, 22.0, 23.1], 1500, 23.2)
+    assert regret.regrets(record) == pytest.approx([1.0 - 20.0 / 23.2, 1.0 - 20.0 / 21.0])
 
 
 @pytest.mark.parametrize("name", ["direct", "shgo"])
