@@ -116,13 +116,15 @@ def campaign(
 
 def _print_summary(console: Console, out: Path) -> None:
     from bifa.campaign.page import prediction_table, speed_table
-    from bifa.report.diagnosis import noise_table
+    from bifa.report.diagnosis import noise_table, verdict_sentence
     from bifa.report.terminal import plain_spaces, print_lines, print_table
     from bifa.report.words import effect_words
 
     summary = json.loads((out / "summary.json").read_text())
-    effects = "; ".join(effect_words(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
-    console.print(Text.assemble("verdict: ", (summary["verdict"], "bold"), f", {plain_spaces(effects)}"))
+    verdict, effects = summary["verdict"], summary["effects"]
+    named = "; ".join(effect_words(e["name"], e["parameters"]) for e in effects)
+    said = f", {plain_spaces(named)}" if named else f". {verdict_sentence(verdict, effects, summary['remainder'])}"
+    console.print(Text.assemble("verdict: ", (verdict, "bold"), said))
     if summary["truth"] is not None:
         inside = "; ".join(effect_words(name, values) for name, values in summary["truth"].items())
         print_lines(console, [f"the seal opened: {inside or 'nothing'}"])

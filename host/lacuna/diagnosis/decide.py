@@ -120,20 +120,36 @@ class Comparison:
     def worse(self, one: Candidate, other: Candidate) -> bool:
         """Whether `one` predicts worse than `other`: beyond doubt, by a margin that matters, and by more than a wrong
         functional form of an effect already included would account for."""
-        return self.is_significantly_worse(one, other) and self._is_much_worse(one, other) and self.matters(one, other)
+        return not self.why_not_worse(one, other)
+
+    def why_not_worse(self, one: Candidate, other: Candidate) -> str:
+        """Say why `other` is not preferred to `one`; empty if it is."""
+        if chance := self._why_by_chance(one, other):
+            return chance
+        if self._is_much_worse(one, other) and self.matters(one, other):
+            return ""
+        return "it closes too little of what is missing in records that were not fitted"
 
     def is_significantly_worse(self, one: Candidate, other: Candidate) -> bool:
         """Whether `other` is better by more than noise and remaining misfit can explain, on trials that it was not
         fitted to as well, and robustly to the choice of conditions measured."""
+        return not self._why_by_chance(one, other)
+
+    def _why_by_chance(self, one: Candidate, other: Candidate) -> str:
+        """Say why `other` may be better than `one` by chance only; empty if it is better beyond doubt."""
         least = self.policy.gain * _extra(one, other)
         gain = (one.cost - other.cost) / self.dispersion
+        if gain <= least:
+            return f"it gains a log-likelihood of {gain:.1f}, and chance may gain up to {least:.3g}"
         unseen = (one.checked_cost - other.checked_cost) / self.dispersion
-        return (
-            gain > least
-            and unseen > self.policy.unseen_gain * least
-            and other.checked_error < one.checked_error
-            and _chance_probability(one, other) < self.policy.doubt
-        )
+        if unseen <= self.policy.unseen_gain * least or other.checked_error >= one.checked_error:
+            return "records that were not fitted are hardly predicted better"
+        if (chance := _chance_probability(one, other)) >= self.policy.doubt:
+            return (
+                "it depends on which conditions were measured: with the conditions drawn anew, records that were not"
+                f" fitted are predicted no better with a probability of {chance:.2f} ({self.policy.doubt:g} is allowed)"
+            )
+        return ""
 
     def _is_much_worse(self, one: Candidate, other: Candidate) -> bool:
         """Whether each additional effect closes its share of what is left, and also its share of the gap or half of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -12,7 +12,7 @@ from lacuna.diagnosis import warn
 from lacuna.diagnosis.candidate import Candidate, refitted_without
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.cross_fit import cross_fitted, is_due
-from lacuna.diagnosis.decide import Choice, choose, weigh
+from lacuna.diagnosis.decide import Choice, Comparison, choose, weigh
 from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.learn import holds, learn_correction
 from lacuna.diagnosis.named import Estimated, Named, Nearest, describe_base, describe_effects, lost_without, nearest
@@ -261,17 +261,29 @@ def _explained_nuisances(case: Case, choice: Choice, found: Search) -> list[Foll
     return [one for one in case.followed(found.base) if one.nuisance not in still]
 
 
-def _doubts(case: Case, choice: Choice, judged: Assessment, effects: tuple[Named, ...]) -> list[str]:
-    """Warnings that qualify a verdict naming `effects`, which may be empty."""
+def _doubts(
+    case: Case, found: Search, choice: Choice, judged: Assessment, effects: tuple[Named, ...], tried: Sequence[Nearest]
+) -> list[str]:
+    """Warnings that qualify a verdict naming `effects`, which may be empty. `tried`: the nearest other explanations."""
     if judged.verdict == "none":
         return warn.not_predicted(judged.base, case.split, judged.before, judged.floor, case.policy)
+    if not effects and choice.candidate.effects:
+        return warn.explains_too_little(choice, case.split, judged.tested, case.policy)
     if not effects:
-        return (
-            warn.explains_too_little(choice, case.split, judged.tested, case.policy) if choice.candidate.effects else []
-        )
+        return _unsupported(case, found, tried)
     within, library = case.intervals(choice.candidate), case.system.effects
     absent = [name for name in choice.candidate.effects if may_be_absent(library[name], within)]
     return [*warn.doubts(choice, case.split, judged.tested), *warn.perhaps_absent(absent)]
+
+
+def _unsupported(case: Case, found: Search, tried: Sequence[Nearest]) -> list[str]:
+    """A warning that says why the nearest explanation that would close most of the gap is not supported."""
+    near = next((found.with_effects(one.effects) for one in tried if one.share_of_gap > case.policy.half), None)
+    if near is None:
+        return []
+    against = Comparison(found, case.policy, case.exceeds)
+    base, other = (case.cross_validated.get(one, one) for one in (found.base, against.form(near)))
+    return warn.unsupported(near.effects, against.why_not_worse(base, other))
 
 
 def _reported(
@@ -289,6 +301,7 @@ def _reported(
     shown = choice.candidate if identified else found.base
     signature = describe(judged.explained, judged.left, judged.drifts)
     effects = describe_effects(case, found, choice, closed) if identified else ()
+    tried = nearest(case, found, choice if identified else None)
     return Diagnosis(
         verdict=judged.verdict,
         effects=effects,
@@ -303,10 +316,10 @@ def _reported(
         remainder_before=judged.remainder,
         signature=describe(judged.base, judged.remainder, judged.drifts, unshared=judged.unshared),
         left=Left(judged.left, signature, 1.0 - closed),
-        nearest=nearest(case, found, choice if identified else None),
+        nearest=tried,
         warnings=(
             *warn.repeats_apart(judged.floor),
-            *_doubts(case, choice, judged, effects),
+            *_doubts(case, found, choice, judged, effects, tried),
             *said,
             *(warn.impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
         ),

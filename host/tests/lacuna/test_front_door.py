@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
@@ -97,6 +98,14 @@ def test_it_is_said_of_what_is_supported_that_it_explains_too_little(monkeypatch
     assert found.verdict == "unexplained"
     assert found.warnings[0].startswith("sensor_lag predicts better beyond doubt, but explains too little")
     assert "though not named: sensor_lag" in str(found)
+
+
+def test_it_is_said_why_what_would_close_the_gap_is_not_supported():
+    policy = replace(lacuna.Policy(), gain=1e9)
+    found = lacuna.diagnose(heater.system(), heater.records(**LAG), progress=False, policy=policy)
+    assert found.verdict == "unexplained"
+    said = r"sensor_lag is not supported: it gains a log-likelihood of \d+\.\d, and chance may gain up to 1e\+09\."
+    assert re.match(said, found.warnings[0])
 
 
 def test_what_the_data_would_hardly_show_was_not_seen_at_any_size():

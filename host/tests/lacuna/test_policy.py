@@ -1,5 +1,6 @@
 """Each rule of the engine: listed with its reason, and tested on either side of its threshold."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -128,6 +129,21 @@ def test_doubt_what_a_few_conditions_contradict_is_not_beyond_it():
     assert mixed.cost == alike.cost
     assert worse(base, alike, base)
     assert not worse(base, mixed, base, policy=replace(POLICY, doubt=1e-3))
+
+
+def test_why_an_explanation_is_not_supported_is_told():
+    base = tried((), 40.0)
+    few = Tried((), (62.5,) * 8, (80.0,) * 8), Tried(("a",), (62.5,) * 8, (60.0,) * 4 + (90.0,) * 4)
+    told = {
+        "it gains a log-likelihood of 3.9, and chance may gain up to 8": (base, tried(("a",), 36.0)),
+        "records that were not fitted are hardly predicted better": (base, tried(("a",), 20.0, unseen=0.95)),
+        r"conditions drawn anew, .* no better with a probability of 0\.\d\d \(0\.05 is allowed\)": few,
+        "it closes too little of what is missing": (tried((), 1000.0), tried(("a",), 960.0)),
+        "^$": (tried((), 1000.0), tried(("a",), 0.0)),
+    }
+    for words, (one, other) in told.items():
+        against = Comparison(found(one, other), POLICY, lambda *_: True)
+        assert re.search(words, against.why_not_worse(one, other)), against.why_not_worse(one, other)
 
 
 def test_what_does_not_matter_is_not_worse():
