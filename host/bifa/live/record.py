@@ -98,15 +98,13 @@ def record_telemetry(
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
     log = _TelemetryLog(board, out, parameters, end_s, console)
     try:
-        with locked(out):
+        with locked(out), log.absence:
             while time.monotonic() < end_s:
                 with log.absence.waited_out():
                     log.record_until_gone()
     except KeyboardInterrupt as interrupt:
-        console.print("ended")
         raise_if_unconfirmed(interrupt)
-    if log.absence.unconfirmed is not None:
-        raise log.absence.unconfirmed
+        console.print("ended")
     console.print(f"{out} holds the telemetry; a data set also needs the displacement from your own instrument")
 
 

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from bifa.link import Clock, Sample, StillMovingError, Uno
+from bifa.link.leaving import raise_if_unconfirmed
 from bifa.rig import GONE, RETRY_S
 
 LARGEST_LAG_S = 0.2
@@ -58,11 +59,21 @@ class Latest:
 @dataclass
 class Absence:
     """Waiting for a board to come back, as long as `is_awaited()`; `tell(error)` says that it is gone. `unconfirmed`:
-    the error of a stop that was not confirmed, which whoever connects again sets to None."""
+    the error of a stop that was not confirmed, which whoever connects again sets to None. As a context manager, it
+    raises that error however the wait ends."""
 
     is_awaited: Callable[[], bool]
     tell: Callable[[Exception], None]
     unconfirmed: StillMovingError | None = None
+
+    def __enter__(self) -> "Absence":
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        if isinstance(error, KeyboardInterrupt):
+            raise_if_unconfirmed(error)
+        if self.unconfirmed is not None:
+            raise self.unconfirmed
 
     @contextmanager
     def waited_out(self) -> Iterator[None]:

@@ -3,10 +3,8 @@ overtakes it all."""
 
 import json
 import math
-import signal
-import sys
 import threading
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -14,7 +12,7 @@ import pytest
 
 from bifa.link import PortGoneError, StillMovingError, Uno, frames
 from bifa.live.conversation import Conversation
-from bifa.live.web.pilot import BusyError, NotConnectedError, Pilot, fly
+from bifa.live.web.pilot import BusyError, NotConnectedError, Pilot
 from harness.board import Board
 from harness.waiting import PATIENCE_S
 
@@ -258,48 +256,3 @@ def test_a_stop_drops_what_was_typed_and_has_not_begun(board, held, capsys):
         assert "-- not carried out: clear, run" in printed
         assert (board.state, board.valves) == ("stopped", 0)
         assert "ok" in printed.splitlines(), "the line already begun is answered"
-
-
-def interrupted_after_the_board_vanished(call, monkeypatch):
-    """Fly a walking robot whose port vanishes while a page is open, with Ctrl-C at the given call of a function of
-    bifa after that (Python looks for signals at calls); return the calls until it was to be back, and what was raised.
-    """
-    monkeypatch.setattr("bifa.live.rounds.RETRY_S", 0)
-    monkeypatch.setattr("bifa.live.rounds.Pace.wait", lambda pace: None)
-    board, gone, calls = Board(), Mock(side_effect=PortGoneError("/dev/robot is gone")), 0
-
-    @contextmanager
-    def opened():
-        if board.read is gone:
-            raise KeyboardInterrupt  # it never comes back
-        yield SimpleNamespace(transport=board, clock=board, instruments=None)
-
-    def trace(frame, event, _):
-        nonlocal calls
-        if board.read is gone and "/bifa/" in frame.f_code.co_filename:
-            calls += 1
-            if calls == call:
-                signal.raise_signal(signal.SIGINT)
-
-    def tell(report, samples):
-        if report.get("robot") == "running":
-            board.read = board.write = gone
-
-    sys.settrace(trace)  # called at calls
-    try:
-        fly(Pilot(), SimpleNamespace(open=opened), tell, lambda text: None, None, lambda uno, is_back: uno.run())
-    except BaseException as error:
-        return calls, error
-    finally:
-        sys.settrace(None)
-
-
-def test_ctrl_c_at_any_moment_after_a_walking_robot_vanished_says_that_it_may_be_moving(
-    monkeypatch, signals_as_in_a_terminal
-):
-    calls, error = interrupted_after_the_board_vanished(None, monkeypatch)
-    assert isinstance(error, StillMovingError)
-    assert calls > 30
-    for call in range(1, calls - 5):  # not in the handling of the Ctrl-C that ends it
-        _, error = interrupted_after_the_board_vanished(call, monkeypatch)
-        assert isinstance(error, StillMovingError), (call, calls)

@@ -14,7 +14,6 @@ from typing import Any
 
 from bifa.errors import BifaError
 from bifa.link import Clock, LinkError, RefusedError, Sample, StillMovingError, Uno
-from bifa.link.leaving import raise_if_unconfirmed
 from bifa.link.table import CHAMBERS
 from bifa.live.cycle_speed import CycleSpeed
 from bifa.live.rounds import Absence, Latest, Pace
@@ -358,8 +357,7 @@ def fly(
             told.append(str(error))
             say(f"{error}\n{_WAITING}")
 
-    absence = Absence(pilot.is_watched, tell_once)
-    try:
+    with Absence(pilot.is_watched, tell_once) as absence:
         while (left_s := end_s - time.monotonic()) > 0:
             with absence.waited_out(), board.open() as rig:
                 position_mm = getattr(rig.instruments, "position_mm", None)
@@ -367,9 +365,3 @@ def fly(
                 uno, came_back = Uno(rig.transport, rig.clock), _CAME_BACK if told else ""
                 pilot.fly(uno, rig.clock, tell, length_s, take_off, position_mm, came_back)
                 return
-    except KeyboardInterrupt as interrupt:
-        raise_if_unconfirmed(interrupt)
-        if absence.unconfirmed is None:
-            raise
-    if absence.unconfirmed is not None:
-        raise absence.unconfirmed
