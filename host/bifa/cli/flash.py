@@ -39,6 +39,8 @@ def flash(
         with console.status("building"):
             image = build_image(project, on_line)
         console.print(f"built {image.relative_to(project)}")
+        if chosen is not None:
+            choose_port(chosen)  # building takes long enough for another program to open it
     if chosen is None:
         return
     with console.status(f"writing to {chosen}"):

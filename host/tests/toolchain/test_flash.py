@@ -7,6 +7,7 @@ import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 import serial
@@ -150,6 +151,16 @@ def test_the_image_that_is_written_runs_in_the_chip_and_answers(monkeypatch, no_
     assert (writes / "arguments").read_text() == (
         "-p atmega328p -c arduino -P /dev/ttyACM0 -b 115200 -D -U flash:w:uno.hex:i\n"
     )
+
+
+def test_a_port_that_was_opened_while_the_image_was_built_is_not_written_to(monkeypatch, tmp_path):
+    opened = Mock(side_effect=["/dev/ttyACM0", ToolchainError("/dev/ttyACM0 is in use")])
+    monkeypatch.setattr("bifa.toolchain.find_project", lambda: tmp_path)
+    monkeypatch.setattr("bifa.toolchain.build_image", lambda project, on_line: project / "firmware.hex")
+    monkeypatch.setattr("bifa.toolchain.upload_image", writes := Mock())
+    monkeypatch.setattr("bifa.toolchain.choose_port", opened)
+    assert "in use" in str(CliRunner().invoke(app, ["flash"]).exception)
+    assert not writes.called
 
 
 def test_a_failing_avrdude_ends_in_a_sentence(program, no_checkout, writes):
