@@ -21,7 +21,7 @@ from bifa.measure.own_instruments import OwnInstruments
 from bifa.measure.plan import Turn
 from bifa.measure.recording import Bench, idle
 from bifa.measure.text_plot import text_plot
-from bifa.rig import Rig
+from bifa.rig import GONE, Rig
 
 _REPEAT = ("r", "repeat")
 _LOOK_S = 0.25
@@ -94,7 +94,10 @@ class ByHand:
         self._desk.ask("review", f"{seen} {choice}, q discards it and stops.", about)
         while True:
             while (answer := self._desk.answer()) is None:
-                idle(bench, uno, _LOOK_S)
+                try:
+                    idle(bench, uno, _LOOK_S)
+                except GONE:  # what was recorded does not depend on the link any more; the next command reports it
+                    bench.clock.sleep(_LOOK_S)
             if not answer or answer.lower() in _REPEAT:
                 return not answer
             self._desk.again(answer, choice)

@@ -1,11 +1,14 @@
 """A lab's own instruments, read from files: trials are announced, recorded, shown, kept or repeated (real firmware)."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
 from bifa.check import check_trial
 from bifa.data import read_dataset
 from bifa.data.layout import RAW
+from bifa.link import PortGoneError
 from bifa.measure.by_hand import ByHand
 from bifa.measure.desk import Desk
 from bifa.measure.plan import BRISK
@@ -246,3 +249,19 @@ def test_a_fault_whose_cause_is_still_there_is_asked_about_again(bench, tmp_path
     said = "\n".join(here.said)
     assert "(fault sensor_range, head, -" in said
     assert "Not usable: the Uno refused 'clear': fault sensor_range, head, -" in said
+
+
+def test_a_trial_is_kept_whose_review_is_answered_after_the_port_is_gone(bench, tmp_path):
+    here = bench()
+
+    def unplug(asked):
+        gone = Mock(side_effect=PortGoneError("/dev/robot is gone"))
+        here.rig.transport.read = here.rig.transport.write = gone
+        return "" if gone_s and here.rig.clock.now() > gone_s[0] + 1.0 else gone_s.append(here.rig.clock.now())
+
+    gone_s = []
+    here.lab.review = unplug
+    with pytest.raises(PortGoneError):
+        here.run(tmp_path / "day", (STATIC, PULL))
+    (kept,) = read_dataset(tmp_path / "day.partial").trials
+    assert kept.experiment == "static_loading"
