@@ -12,6 +12,7 @@ from bifa.data import Dataset, Trial
 from .finding import Finding
 from .known import check_known
 from .repeats import check_copies, check_repeats
+from .schedule import check_switches
 from .signs import check_anchor_pull, check_static_loading, check_step_response
 from .units import check_strokes, check_units
 from .walks import check_walk
@@ -26,8 +27,9 @@ _CHECKS = {
 def check_trial_plausibility(trial: Trial, walks: Sequence[Trial] = ()) -> list[Finding]:
     """Return likely mistakes in one trial; `walks`: the day's other walks, whose gaits it may really be."""
     if trial.experiment == "locomotion":
-        return [*check_walk(trial, walks), *check_units(trial)]
-    return [*_CHECKS[trial.experiment](trial), *check_units(trial)]
+        return [*check_walk(trial, walks), *check_switches(trial), *check_units(trial)]
+    switches = check_switches(trial) if trial.experiment == "step_response" else ()
+    return [*_CHECKS[trial.experiment](trial), *switches, *check_units(trial)]
 
 
 def check_plausibility(dataset: Dataset) -> list[Finding]:

@@ -1,4 +1,5 @@
-"""Compare a walk's declared gait with its recorded commands: either may belong to another walk."""
+"""Compare a walk's declared gait, and the times at which valves are said to have switched, with the recorded commands:
+either may belong to another trial."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TypeVar
@@ -7,12 +8,15 @@ import numpy as np
 
 from bifa.check.finding import Finding
 from bifa.data import Trial
+from bifa.printable import counted
 from bifa.ranges import RANGES
 from bifa.robot.cpg import CHAMBERS, COUPLING_PER_S
+from bifa.simulate.stepper import OFF
 
 # A record at 100 Hz resolves a phase to 0.2 % of a cycle of 4 s; the Uno's resonator is good to 0.5 %.
 _PERIOD_SHARE = 0.02
 _CYCLE_SHARE = 0.05  # for duties and phases
+_SWITCH_SAMPLES = 2.0  # by which a noted switch may differ from the sample that first shows it
 _SETTLING_TIME_CONSTANTS = 5.0  # time constants of the coupling, after which the phases are those of the gait
 
 Turns = TypeVar("Turns", float, np.ndarray)
@@ -30,6 +34,30 @@ def check_gait(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
         given = ", ".join(f"{trial.walked[name]:g}" for name in wrong)
         text = f"the recorded commands have {values}, but the gait in dataset.toml has {given}"
         yield Finding("gait", f"{text}: {_why(trial, seen, wrong, walks)}", trial.file)
+
+
+def check_switches(trial: Trial) -> Iterator[Finding]:
+    """Yield a finding for each recorded command that contradicts `switch_time_s`, if noted for a step or a walk."""
+    noted = trial.extra.get("switch_time_s")
+    if noted is None:
+        return
+    is_walk = trial.experiment == "locomotion"
+    each = {f"command_{name}": noted.get(name, []) for name in CHAMBERS} if is_walk else {"command": noted}
+    time_s = trial.elapsed_s - trial.extra.get("command_age_s", 0.0)
+    most_s = _SWITCH_SAMPLES * float(np.median(np.diff(time_s))) + trial.extra.get("switch_error_s", 0.0)
+    for column, times in each.items():
+        command = trial.columns[column]
+        state = np.nan_to_num(command, nan=OFF) if is_walk else (command > 0.5).astype(float)
+        seen_s = time_s[1:][np.diff(state) != 0.0]
+        if len(times) != len(seen_s):
+            text = (
+                f"switch_time_s has {counted(len(times), 'time')}, but the recorded command changes {len(seen_s)} times"
+            )
+        elif len(times) and (worst_s := float(np.abs(seen_s - times).max())) > most_s:
+            text = f"switch_time_s differs from the recorded command by up to {worst_s:.3f} s"
+        else:
+            continue
+        yield Finding("switches", f"{text}; correct it in dataset.toml, or leave it out", trial.file, column=column)
 
 
 def estimate_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, float]:

@@ -44,6 +44,12 @@ class Trial:
         return self.columns["time_s"]
 
     @property
+    def elapsed_s(self) -> np.ndarray:
+        """Time since the trial began: its own times if these begin within 1.5 samples after 0, else since the first."""
+        begin_s, sample_s = self.time_s[0], np.median(np.diff(self.time_s))
+        return self.time_s if 0.0 <= begin_s < 1.5 * sample_s else self.time_s - begin_s
+
+    @property
     def commanded_psi(self) -> float:
         """`pressure_psi`, for experiments that set it; raises DatasetError if it is None."""
         return float(self._given("pressure_psi"))

@@ -192,12 +192,12 @@ def _check_switches(trial: Trial, fields: Fields) -> None:
         if not isinstance(noted, dict) or set(noted) - set(CHAMBERS):
             raise extra.error("switch_time_s", f"{trial.file}: must be a table of lists {', '.join(CHAMBERS)}")
         lists = list(noted.values())
-    low, high = trial.time_s[0] - _CLOCK_S, 1.1 * trial.time_s[-1] + _CLOCK_S  # a clock may be 10 % off (NOTED)
+    low, high = -_CLOCK_S, 1.1 * trial.elapsed_s[-1] + _CLOCK_S  # a clock may be 10 % off (NOTED)
     for times in lists:
         if not isinstance(times, list) or any(type(t) not in (int, float) for t in times):
             raise extra.error("switch_time_s", f"{trial.file}: must be a list of numbers")
         if not all(low <= t <= high for t in times) or any(b <= a for a, b in itertools.pairwise(times)):
-            raise extra.error("switch_time_s", f"{trial.file}: must be increasing times within the trial, in s")
+            raise extra.error("switch_time_s", f"{trial.file}: must be increasing times in s since the trial began")
 
 
 def _setting(fields: Fields, key: str) -> Any:

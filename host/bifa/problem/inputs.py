@@ -13,7 +13,6 @@ from bifa import simulate
 from bifa.data import Trial
 from bifa.problem.motion import imposed_motion
 from bifa.problem.switches import (
-    elapsed_s,
     seconds_per_uno_s,
     shifted,
     step_timeline,
@@ -238,7 +237,7 @@ def _pressure_psi(trial: Trial) -> float:
 
 
 def _time_s(trial: Trial) -> np.ndarray:
-    return elapsed_s(trial) * seconds_per_uno_s(trial)
+    return trial.elapsed_s * seconds_per_uno_s(trial)
 
 
 def _static(trial: Trial) -> StaticInputs:

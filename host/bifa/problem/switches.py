@@ -22,12 +22,6 @@ from bifa.simulate.stepper import POSITIVE
 _SPARE_S = 1e-6  # tolerance for times that coincide with a sample
 
 
-def elapsed_s(trial: Trial) -> np.ndarray:
-    """Time since the trial began: its own times if these begin within 1.5 samples after 0, else since the first one."""
-    begin_s, sample_s = trial.time_s[0], np.median(np.diff(trial.time_s))
-    return trial.time_s if 0.0 <= begin_s < 1.5 * sample_s else trial.time_s - begin_s
-
-
 def shifted(commands: Timeline, late_s: float) -> Timeline:
     """Delay all switches by `late_s`, except the initial state at time 0."""
     if late_s == 0.0:
@@ -59,28 +53,36 @@ def switch_sd_s(trial: Trial) -> float:
     noted = trial.extra.get("switch_error_s")
     if noted is not None:
         return float(noted) / np.sqrt(3.0)
-    if trial.experiment != "step_response" or "switch_time_s" in trial.extra:
+    if trial.experiment != "step_response" or _noted_steps(trial) is not None:
         return 0.0
     sample_s = float(np.median(np.diff(trial.time_s)))
     return 0.5 * sample_s / np.sqrt(3.0)
 
 
 def step_timeline(trial: Trial) -> Timeline:
-    """The switches of a step response, as chamber 0, on the time axis of `elapsed_s`."""
-    time_s = elapsed_s(trial)
-    state = (trial.columns["command"] > 0.5).astype(int)
-    at = np.flatnonzero(np.diff(state)) + 1
-    noted = trial.extra.get("switch_time_s")
-    if noted is not None and len(noted) == len(at):
-        times = np.asarray(noted, float)
-    else:
+    """The switches of a step response, as chamber 0, on the time axis of `Trial.elapsed_s`."""
+    time_s, (state, at) = trial.elapsed_s, _recorded_steps(trial)
+    times = _noted_steps(trial)
+    if times is None:
         times = 0.5 * (time_s[at - 1] + time_s[at])
     return timeline([(0.0, 0, state[0]), *((t, 0, state[i]) for t, i in zip(times, at, strict=True))])
 
 
+def _recorded_steps(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """The state (samples,) of a step response's valves, and the samples that first show a new one."""
+    state = (trial.columns["command"] > 0.5).astype(int)
+    return state, np.flatnonzero(np.diff(state)) + 1
+
+
+def _noted_steps(trial: Trial) -> np.ndarray | None:
+    """The noted times of a step response's switches; None if there are not as many as recorded ones."""
+    noted = trial.extra.get("switch_time_s")
+    return np.asarray(noted, float) if noted is not None and len(noted) == len(_recorded_steps(trial)[1]) else None
+
+
 def walk_timeline(trial: Trial) -> Timeline:
-    """The switches of a walk, on the time axis of `elapsed_s`."""
-    time_s = elapsed_s(trial)
+    """The switches of a walk, on the time axis of `Trial.elapsed_s`."""
+    time_s = trial.elapsed_s
     commands = recorded_commands(trial.columns)
     recorded = of_samples(time_s - trial.extra.get("command_age_s", 0.0), commands)
     noted = trial.extra.get("switch_time_s")

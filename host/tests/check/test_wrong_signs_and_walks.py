@@ -1,5 +1,8 @@
 """Wrong signs, mirrored cameras, exchanged tubes or columns, and gaits that were not walked are found."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from bifa.check.plausibility import check_plausibility
@@ -110,3 +113,35 @@ def test_a_likely_cause_is_named(day, gait, cause):
 def test_phases_that_no_coupling_settles_contradict_nothing(day):
     uncoupled = told(coupling_per_s=0.0, psi12_deg=10.0)
     assert said(mistaken(day, "walk_baseline_2.csv", uncoupled)) == []
+
+
+def noted_later(late_s):
+    """Note every switch later than it was."""
+
+    def change(trial):
+        noted = trial.extra["switch_time_s"]
+        return replace(trial, extra=trial.extra | {"switch_time_s": [time_s + late_s for time_s in noted]})
+
+    return change
+
+
+def test_noted_switches_that_the_command_contradicts(day):
+    file = "step_large_8.5psi_2.csv"
+    assert said(mistaken(day, file, noted_later(0.01))) == []
+    (found,) = check_plausibility(mistaken(day, file, noted_later(0.5)))
+    assert (found.kind, found.file, found.column) == ("switches", file, "command")
+    assert "switch_time_s differs from the recorded command by up to 0.5" in found.text
+    none = mistaken(day, file, lambda trial: replace(trial, extra=trial.extra | {"switch_time_s": []}))
+    (found,) = check_plausibility(none)
+    assert "switch_time_s has 0 times, but the recorded command changes 2 times" in found.text
+
+
+def test_noted_switches_of_a_walk_that_one_command_contradicts(any_day):
+    (walk, *_) = any_day.of("locomotion")
+    time_s = walk.time_s
+    seen = {name: time_s[1:][np.diff(walk.columns[f"command_{name}"]) != 0.0].tolist() for name in CHAMBERS}
+    exact = lambda trial: replace(trial, extra=trial.extra | {"switch_time_s": seen})  # noqa: E731
+    assert said(mistaken(any_day, walk.file, exact)) == []
+    late = seen | {"head": [time_s + 0.5 for time_s in seen["head"]]}
+    wrong = mistaken(any_day, walk.file, lambda trial: replace(trial, extra=trial.extra | {"switch_time_s": late}))
+    assert [found.column for found in check_plausibility(wrong)] == ["command_head"]

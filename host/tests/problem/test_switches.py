@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bifa.data import Trial
+from bifa.data import Dataset, DatasetError, Trial, read_dataset, write_dataset
 from bifa.problem.inputs import inputs_of
 from bifa.problem.switches import step_timeline, switch_sd_s, valves_of, walk_timeline
 from bifa.simulate import timeline, vented_between
@@ -150,3 +150,20 @@ def test_valves_are_told_in_seconds_of_the_quartz():
 def test_without_notes_the_commands_are_what_the_valves_do():
     trial = step(0.5, switch_time_s=[0.5, 3.5])
     np.testing.assert_array_equal(valves_of(step_timeline(trial), trial).time_s, step_timeline(trial).time_s)
+
+
+@pytest.mark.parametrize("begin_s", [0.0, 100.0, -5.0])
+def test_noted_times_count_from_the_trials_begin_wherever_its_clock_stands(begin_s, tmp_path):
+    declared = step(0.5, switch_time_s=[0.493, 3.494])
+    columns = {"time_s": TIME + begin_s, "command": declared.columns["command"]}
+    columns |= {name: np.zeros(len(TIME)) for name in ("displacement_mm", "pressure_psi")}
+    trial = replace(declared, columns=columns)
+    (read,) = read_dataset(write_dataset(tmp_path / "day", Dataset(None, "day", {}, (trial,)))).trials
+    assert list(step_timeline(read).time_s) == [0.0, 0.493, 3.494]
+    absolute = replace(trial, extra={"switch_time_s": [begin_s + 100.493, begin_s + 103.494]})
+    with pytest.raises(DatasetError, match="must be increasing times in s since the trial began"):
+        write_dataset(tmp_path / "absolute", Dataset(None, "day", {}, (absolute,)))
+
+
+def test_noted_times_that_are_not_as_many_as_the_switches_are_not_used():
+    assert switch_sd_s(step(0.5, switch_time_s=[])) == switch_sd_s(step(0.5)) > 0.0
