@@ -20,6 +20,8 @@ from bifa.campaign.resolve import joined
 from bifa.campaign.stages import StageError
 from bifa.campaign.walks import predict, prediction_of, speed_of
 from bifa.data import Dataset, Trial, read_dataset
+from bifa.data.layout import TABLE_FILE
+from bifa.data.write import partial_of
 from bifa.files import write_text
 from bifa.gait.prediction import MIN_SPEED_RATIO
 from bifa.robot import Model, load_model, save_model
@@ -145,6 +147,12 @@ def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
     return np.array(measured) - predicted
 
 
+def _walked_in(folder: Path) -> Gait | None:
+    """The gait of a round's data set, finished or not; None if it has no walk."""
+    trials = read_dataset(folder).trials if (folder / TABLE_FILE).exists() else ()
+    return Gait(**trials[0].walked) if trials else None
+
+
 def again(inputs: Path, outputs: Path, dataset: Dataset, steps: RoundSteps) -> None:
     """Repeat rounds until a gait at the edge is predicted, nothing changes, no gait is expected to walk, or `ROUNDS` is
     reached.
@@ -170,15 +178,13 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, steps: RoundSteps) -> N
         if model.effects and not completed.effects:
             completed = model
         folder = outputs / "rounds" / f"walks-{number}"
-        if folder.exists():
-            walks = read_dataset(folder)
-            found.append(Gait(**walks.trials[0].walked))
-        elif (gait := steps.optimize(completed, (*began, *found))) is not None:
-            walks = steps.walk(number, completed, gait, folder)
-            found.append(gait)
-        else:
+        # not sought again if it has begun to walk: elsewhere the search may end a digit away
+        gait = _walked_in(folder) or _walked_in(partial_of(folder)) or steps.optimize(completed, (*began, *found))
+        if gait is None:
             ended = Ending.FALLS
             break
+        walks = read_dataset(folder) if folder.exists() else steps.walk(number, completed, gait, folder)
+        found.append(gait)
         model = completed
         rounds.append(judged(model, walks, at_edge=True))
     rounds[-1] = replace(rounds[-1], ended=ended)

@@ -16,6 +16,7 @@ from bifa.campaign.summary import summarize
 from bifa.campaign.walks import measure_walks, planned_cycles
 from bifa.data import Dataset, read_dataset, write_dataset
 from bifa.data.dataset import labels_of
+from bifa.files import is_stray
 from bifa.gait import Optimum, SearchError, Settings, optimize, simulations
 from bifa.gait.library.scenarios import provenance
 from bifa.gait.objectives import QUANTILE
@@ -221,7 +222,7 @@ def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: 
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
-        for folder in sorted((inputs / "separating").iterdir()):
+        for folder in sorted(path for path in (inputs / "separating").iterdir() if not is_stray(path.name)):
             dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
         steps = RoundSteps(complete, lambda robot, walked: gait_at_edge(robot, setup.seed, on_progress, walked), walk)
         again(inputs, outputs, dataset, steps)

@@ -3,7 +3,6 @@
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -111,10 +110,10 @@ def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -
 
 
 def _measurement_info(measured: Dataset) -> list[tuple[str, str]]:
-    """When the data were measured, by the date of the file, and with which firmware."""
-    day = datetime.fromtimestamp((measured.folder / "dataset.toml").stat().st_mtime).date().isoformat()
-    firmware = measured.provenance.get("firmware")
-    return [("measured", day), *([("firmware", str(firmware))] if firmware else [])]
+    """The day (UTC) on which the data were measured, and with which firmware, where noted."""
+    noted = measured.provenance
+    day, firmware = str(noted.get("recorded_at", ""))[: len("2026-11-29")], str(noted.get("firmware", ""))
+    return [(name, value) for name, value in (("measured", day), ("firmware", firmware)) if value]
 
 
 def _robustness(model: Model, gaits: Mapping[str, Gait]) -> dict[str, list[float]]:

@@ -222,3 +222,17 @@ def test_a_robot_that_never_settles_is_given_all_cycles():
     tethered = ROBOT.with_effects({"tether_drag": {"drag_N_m": 0.5}})
     assert planned_cycles(ROBOT, BASELINE, 7) == 7
     assert planned_cycles(tethered, BASELINE, 7) == MAX_CYCLES
+
+
+def test_a_gait_that_an_interrupted_run_has_begun_to_walk_is_not_sought_again(folders):
+    """The search may end a digit away on another computer; its walks would be another condition."""
+    begun, asked = folders[1] / "rounds" / "walks-2.partial", []
+    write_dataset(begun, replace(both := walked({"round-2": FASTER}, 2), trials=both.trials[:1]))
+
+    def walk(number, model, gait, folder):
+        asked.append(gait)
+        return walk_into(number, model, gait, folder)
+
+    steps = RoundSteps(lambda dataset, suspected: ROBOT, lambda model, walked: pytest.fail("sought again"), walk)
+    rounds_of(folders, ROBOT, steps)
+    assert asked == [FASTER]
