@@ -106,13 +106,15 @@ def named(path: Path) -> Path:
 
 @contextmanager
 def written(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """`with written(path) as aside:` write to `aside`, a file beside `path`; after the block it replaces `path`.
+    """`with written(path) as aside:` write to `aside`, a file beside `path`; after the block it replaces `path`, or the
+    file that this links to.
 
     Whatever happens (an error, a full disk, a power cut), `path` is the old file or the complete new one. An OSError in
     the block becomes a TargetError.
     """
     target = Path(path)
     _refuse_irregular(target)
+    target = target.resolve() if target.is_symlink() else target
     aside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
     try:
         yield aside

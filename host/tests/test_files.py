@@ -155,3 +155,13 @@ def test_the_command_says_so(tmp_path):
     result = CliRunner().invoke(app, ["upload", str(tmp_path / "gait.toml"), "--port", "/dev/null"])
     assert result.exit_code != 0
     assert "not a regular file" in result.output + str(result.exception)
+
+
+def test_what_a_link_leads_to_is_written_and_the_link_stays(tmp_path):
+    shared, link = tmp_path / "lab" / "bench.toml", tmp_path / "bench.toml"
+    shared.parent.mkdir()
+    shared.write_text("old\n")
+    link.symlink_to(shared)
+    write_text(link, "new\n")
+    assert (link.is_symlink(), shared.read_text()) == (True, "new\n")
+    assert list(shared.parent.iterdir()) == [shared]

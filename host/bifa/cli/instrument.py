@@ -8,7 +8,7 @@ import typer
 
 from bifa.cli._options import BENCH_FILE
 from bifa.errors import BifaError
-from bifa.files import check_targets, write_text
+from bifa.files import check_targets
 from bifa.screen import Console
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def instrument(
     if role is not None and role not in _ROLES:
         raise typer.BadParameter(f"--role must be machine or camera, not {role}")
 
-    from bifa.measure.bench_file import read_exports
+    from bifa.measure.bench_file import add_table, read_exports
     from bifa.measure.propose import declaration, look
 
     check_targets(bench, inputs=(file,))
@@ -71,8 +71,7 @@ def instrument(
     console.print(f"\n{text}")  # before it is checked, so that the answers are not lost if that fails
     _verify(console, file, role, table)
     if typer.confirm(f"Write this into {bench}?", default=False):
-        before = bench.read_text(encoding="utf-8") if bench.exists() else ""
-        write_text(bench, f"{before.rstrip()}\n\n{text}" if before.strip() else text)
+        add_table(bench, text)
         console.print(f"written: {bench}")
 
 

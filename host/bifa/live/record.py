@@ -15,6 +15,7 @@ from rich.progress import Progress
 from rich.status import Status
 
 from bifa.errors import BifaError
+from bifa.files import is_stray
 from bifa.link import RefusedError, Sample, Uno
 from bifa.link.leaving import raise_if_unconfirmed
 from bifa.link.table import CHAMBERS, MARK_PAUSE
@@ -92,7 +93,8 @@ def record_telemetry(
 ) -> None:
     """Record a bare Uno's telemetry into `out`/telemetry_<n>.csv, a new file each time that the port comes back."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
-    if out.exists() and any(not entry.name.startswith("telemetry_") for entry in out.iterdir()):
+    others = (path for path in out.glob("*") if not path.name.startswith("telemetry_"))
+    if not all(is_stray(path.name) for path in others):
         raise RecordingError(f"{out} contains other files; choose a new folder")
     out.mkdir(parents=True, exist_ok=True)
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s

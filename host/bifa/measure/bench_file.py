@@ -79,8 +79,7 @@ def read_bench(path: Path) -> dict[str, float]:
 
 def load_or_ask_known(path: Path, desk: Desk) -> dict[str, float]:
     """Return the known values of the bench; if its file does not have them, ask at the desk and write them to it."""
-    document, before = _read(path) if path.exists() else ({}, "")
-    if "known" in document:
+    if path.exists() and "known" in _read(path)[0]:
         return read_bench(path)
     desk.say(f"Which of these have you measured directly? You are asked once; the answers are kept in {path}.")
     known: dict[str, float] = {}
@@ -89,9 +88,23 @@ def load_or_ask_known(path: Path, desk: Desk) -> dict[str, float]:
             known |= _ask(desk, name, meaning)
     finally:
         desk.clear()
-    write_text(path, tomli_w.dumps({"known": known}) + (f"\n{before}" if before else ""))
+    add_table(path, tomli_w.dumps({"known": known}))
     desk.say(f"Saved in {path}; edit that file to correct a value.")
     return known
+
+
+def add_table(path: Path, table: str) -> None:
+    """Append a table (TOML) to the file, which keeps what else it has; it is created if needed. Raises BenchFileError
+    if that gives no valid file."""
+    before = _read(path)[1].rstrip() if path.exists() else ""
+    text = f"{before}\n\n{table}" if before else table
+    try:
+        parse_toml(text)
+    except tomllib.TOMLDecodeError as error:
+        raise BenchFileError(
+            f"{path}: this cannot be appended ({error}); write it into the file yourself:\n{table}"
+        ) from None
+    write_text(path, text)
 
 
 def _ask(desk: Desk, name: str, meaning: str) -> dict[str, float]:

@@ -63,6 +63,7 @@ def run_session(
     Raises DatasetError if `folder` is a finished data set, or an unfinished one of another session or with other
     `options` in its provenance; LockedError if another process is recording into it.
     """
+    _refuse_same_names(trials)
     with locked(folder):
         with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
             hello = uno.connect()
@@ -85,6 +86,18 @@ def run_session(
                 link, misfit = uno.counters.since(before), trial_misfit(trial, writer.trials[:-1])
                 on_event(replace(event, share=1.0, trial=trial, link=link, misfit=misfit))
         return writer.finish()
+
+
+def _refuse_same_names(trials: Sequence[PlannedTrial]) -> None:
+    """Raise DatasetError if different trials would have the same file: names show six digits of a condition."""
+    planned: dict[str, PlannedTrial] = {}
+    for trial in trials:
+        other = planned.setdefault(trial.file, trial)
+        if other.as_trial().condition != trial.as_trial().condition:
+            raise DatasetError(
+                f"{trial.file} would be the file of two trials, whose conditions differ by less than its name shows; "
+                "leave one out, or record them into two data sets"
+            )
 
 
 def refuse_other_settings(writer: DatasetWriter, provenance: Mapping[str, Any]) -> None:

@@ -26,6 +26,16 @@ def test_numbers_go_on_after_the_largest(tmp_path):
     assert next_file(tmp_path).name == "telemetry_3.csv"
 
 
+@pytest.mark.parametrize(("name", "is_refused"), [(".DS_Store", False), ("Thumbs.db", False), ("notes.csv", True)])
+def test_strays_of_the_system_do_not_keep_telemetry_out_of_a_folder(board, tmp_path, name, is_refused):
+    (tmp_path / name).touch()
+    port = SameBoard(None, lambda port: nullcontext(SimpleNamespace(transport=board, clock=board)))
+    told = pytest.raises(RecordingError, match="contains other files") if is_refused else nullcontext()
+    with told:
+        record_telemetry(port, tmp_path, None, 0.2, Console(quiet=True))
+    assert (tmp_path / "telemetry_1.csv").exists() is not is_refused
+
+
 def test_a_full_disk_leaves_whole_lines_and_is_said(tmp_path):
     path = tmp_path / "telemetry_1.csv"
     kept = pytest.raises(RecordingError, match="1 samples so far are kept")

@@ -281,3 +281,10 @@ def test_two_sessions_do_not_record_into_one_data_set(rig, tmp_path):
         run(rig, tmp_path / "day")
     assert rig.uno.time_s < 0.1
     assert not list(tmp_path.iterdir())
+
+
+def test_conditions_that_a_files_name_does_not_tell_apart_are_refused_before_anything_moves(rig, tmp_path):
+    alike = (STATIC, replace(STATIC, pressure_psi=STATIC.pressure_psi + 1e-7))
+    with pytest.raises(DatasetError, match=r"static_small_4psi_20mm_s_1\.csv would be the file of two trials"):
+        run(rig, tmp_path / "day", alike)
+    assert list(tmp_path.iterdir()) == []
