@@ -3,6 +3,7 @@
 import json
 from collections.abc import Collection
 from dataclasses import asdict, replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,8 @@ def _characterize(setup: Setup, effort: Effort, on_trial: OnProgress) -> list[St
     correcting one does not require measuring again."""
     kept, trials = not setup.is_virtual, plan.session(quick=effort.quick)
     data, known = ("measured", {}) if kept else ("bench", dict(setup.known))
+    # the same seed gives the same bytes, so a virtual robot's data have no date
+    day = {"recorded_at": datetime.now(UTC).isoformat(timespec="seconds")} if kept else {}
 
     def run(inputs: Path, outputs: Path) -> None:
         with setup.open(0) as rig:
@@ -80,7 +83,7 @@ def _characterize(setup: Setup, effort: Effort, on_trial: OnProgress) -> list[St
                 trials,
                 name="campaign" if kept else BENCH_NAME,
                 known=known_of(rig, known),
-                provenance=setup.settings(0),
+                provenance=setup.settings(0) | day,
                 record=setup.hands,
                 on_event=lambda e: on_trial(e.planned.title, (e.number - 1 + e.share) / e.total),
             )

@@ -110,7 +110,7 @@ def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -
 
 
 def _measurement_info(measured: Dataset) -> list[tuple[str, str]]:
-    """The day (UTC) on which the data were measured, and with which firmware, where noted."""
+    """The day (UTC) on which the data were measured, unless on a virtual robot, and with which firmware."""
     noted = measured.provenance
     day, firmware = str(noted.get("recorded_at", ""))[: len("2026-11-29")], str(noted.get("firmware", ""))
     return [(name, value) for name, value in (("measured", day), ("firmware", firmware)) if value]

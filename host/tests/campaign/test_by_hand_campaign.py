@@ -86,7 +86,9 @@ def test_a_campaign_measures_with_the_testing_machine_stops_and_goes_on(lab, tmp
     assert "Saved in bench.toml" in said
     assert (tmp_path / "bench.toml").read_text().startswith("[known]")
     assert "run keeps 1 trial of the stage under way" in interrupt(first)
-    (trial,) = read_dataset(tmp_path / "run" / ".measure-unfinished" / "measured.partial").trials
+    begun = read_dataset(tmp_path / "run" / ".measure-unfinished" / "measured.partial")
+    assert begun.provenance["recorded_at"].startswith("20"), "the report's date"
+    (trial,) = begun.trials
     assert trial.extra["clock_error_s"] < 1e-3
     assert trial.columns["displacement_mm"].max() > 50.0
 
