@@ -11,7 +11,7 @@ from bifa.data import Trial
 from bifa.printable import counted
 from bifa.ranges import RANGES
 from bifa.robot.cpg import CHAMBERS, COUPLING_PER_S
-from bifa.simulate.stepper import OFF
+from bifa.simulate import of_samples, recorded_commands
 
 # A record at 100 Hz resolves a phase to 0.2 % of a cycle of 4 s; the Uno's resonator is good to 0.5 %.
 _PERIOD_SHARE = 0.02
@@ -45,10 +45,9 @@ def check_switches(trial: Trial) -> Iterator[Finding]:
     each = {f"command_{name}": noted.get(name, []) for name in CHAMBERS} if is_walk else {"command": noted}
     time_s = trial.elapsed_s - trial.extra.get("command_age_s", 0.0)
     most_s = _SWITCH_SAMPLES * float(np.median(np.diff(time_s))) + trial.extra.get("switch_error_s", 0.0)
-    for column, times in each.items():
-        command = trial.columns[column]
-        state = np.nan_to_num(command, nan=OFF) if is_walk else (command > 0.5).astype(float)
-        seen_s = time_s[1:][np.diff(state) != 0.0]
+    recorded = of_samples(time_s, recorded_commands(trial.columns) if is_walk else trial.columns["command"][None] > 0.5)
+    for chamber, (column, times) in enumerate(each.items()):
+        seen_s = recorded.time_s[recorded.chamber == chamber][1:]
         if len(times) != len(seen_s):
             text = (
                 f"switch_time_s has {counted(len(times), 'time')}, but the recorded command changes {len(seen_s)} times"
