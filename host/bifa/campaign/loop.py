@@ -72,10 +72,10 @@ def _characterize(setup: Setup, effort: Effort, on_trial: OnProgress) -> list[St
     correcting one does not require measuring again."""
     kept, trials = not setup.is_virtual, plan.session(quick=effort.quick)
     data, known = ("measured", {}) if kept else ("bench", dict(setup.known))
-    # the same seed gives the same bytes, so a virtual robot's data have no date
-    day = {"recorded_at": datetime.now(UTC).isoformat(timespec="seconds")} if kept else {}
 
     def run(inputs: Path, outputs: Path) -> None:
+        # the same seed gives the same bytes, so a virtual robot's data have no date
+        day = {"recorded_at": datetime.now(UTC).isoformat(timespec="seconds")} if kept else {}
         with setup.open(0) as rig:
             run_session(
                 rig,
