@@ -67,10 +67,11 @@ def _shortcuts(optimum: Optimum, runs: Simulations) -> dict[str, float]:
     """Compare walks as a search simulates them with walks without a shortcut, on the robots that it is verified on."""
     search = SearchRun(nominal(), runs, optimum.spread, optimum.settings)
     robots, row = search.verifying_robots(), gait_rows([optimum.gait])
-    metric = replace(optimum.settings.metric, tolerance_m=FINE_M, settled=0.0, looser=1.0)
+    metric = replace(optimum.settings.metric, tolerance_m=FINE_M, settled=0.0, looser=1.0, single=False)
     shortcuts = {
         "settled": ("walks that end once settled", {"settled": optimum.settings.metric.settled}),
         "looser": ("small actuators with a tenth of the accuracy", {"looser": optimum.settings.metric.looser}),
+        "single": ("single precision", {"single": True}),
     }
     full, full_s = _timed(runs, robots, row, metric)
     figures = {}

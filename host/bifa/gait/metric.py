@@ -51,7 +51,7 @@ class Metric:
     refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies. unlike: every cycle
     differs from the one before, so that no walk settles. settled: relative difference between the advances of three
     successive cycles at which a walk counts as settled, and the other cycles are not simulated: of ten it takes five or
-    six. 0 to simulate all. looser: factor on the tolerance of the small actuators' states.
+    six. 0 to simulate all. looser: factor on the tolerance of the small actuators' states. single: in single precision.
     """
 
     cycles: int = 10
@@ -66,6 +66,7 @@ class Metric:
     unlike: bool = False
     settled: float = _SETTLED
     looser: float = _LOOSER
+    single: bool = True
 
     @property
     def is_plain(self) -> bool:
@@ -79,8 +80,8 @@ class Metric:
 
     def finer(self) -> "Metric":
         """Return the metric for finalists: twenty cycles, all simulated and the last ten judged, and a far smaller
-        step."""
-        return replace(self, cycles=20, judged=10, tolerance_m=1e-7, settled=0.0).in_full()
+        step, in double precision."""
+        return replace(self, cycles=20, judged=10, tolerance_m=1e-7, settled=0.0, single=False).in_full()
 
     def in_full(self) -> "Metric":
         """Return the metric with all the cycles of a measured walk, the second half judged, if walks never settle: with
@@ -123,6 +124,7 @@ class Passage:
     clock: float = 1.0
     dead_time_s: float = 0.0
     looser: float = _LOOSER
+    single: bool = True
 
     @property
     def terrain(self) -> np.ndarray:
@@ -135,8 +137,8 @@ class Passage:
         return 0.0
 
     def finer(self) -> "Passage":
-        """Return the metric for finalists: a smaller step."""
-        return replace(self, tolerance_m=1e-6)
+        """Return the metric for finalists: a smaller step, in double precision."""
+        return replace(self, tolerance_m=1e-6, single=False)
 
     def in_full(self) -> "Passage":
         """Return the same metric: a tunnel is passed or not."""

@@ -32,6 +32,7 @@ class Simulations:
             dead_time_s=metric.dead_time_s * metric.clock,
             settled=metric.settled,
             looser=metric.looser,
+            single=metric.single,
             workers=self._workers,
             executor=self._executor,
         )

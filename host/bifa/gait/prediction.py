@@ -109,7 +109,7 @@ class Predictor:
         rows = np.vstack([self._with_switch_errors(np.repeat(own, draws, axis=0)), own])
         rows[:, 0] *= rate
         vented_s = rate * self._timing.dead_time_s
-        progress = speeds(self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, workers=workers)
+        progress = speeds(self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, single=True, workers=workers)
         advance_mm = 1e3 * progress.advance_m
         found = [settling(one) for one in advance_mm]
         begins = [f.begins for f in found[:draws] if f.is_settled]

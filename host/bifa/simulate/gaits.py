@@ -19,7 +19,7 @@ from bifa.simulate.timeline import gait_switches
 
 FAST_TOLERANCE_M = 1e-5
 _PIECES_PER_WORKER = 2
-_LANES_FULL = 4  # least number of walks per lane in a piece: at its end, lanes are idle
+_LANES_FULL = 2  # least number of walks per lane in a piece: at its end, lanes are idle
 
 
 @dataclass(frozen=True)
@@ -54,13 +54,15 @@ def speeds(
     dead_time_s: float = 0.0,
     settled: float = 0.0,
     looser: float = 1.0,
+    single: bool = False,
     workers: int | None = None,
     executor: Executor | None = None,
 ) -> Advance:
     """Simulate gaits (n, 6), all with one model or each with its own of n models; arrays have shape (n, cycles).
     `dead_time_s`: how long the Uno vents a chamber when switching between supplies. `settled`: if not 0, a walk ends
     once the advance of a cycle and those of the two before agree to within this share, and the other cycles repeat it.
-    `looser`: by this factor the small actuators' states may err more than where their pressures are read.
+    `looser`: by this factor the small actuators' states may err more than where their pressures are read. `single`: in
+    single precision, which rounds less than the integrator errs at tolerances down to 1 um.
 
     Runs on `executor`, or else in `workers` threads (by default one per core) without the GIL. Rows are dealt out in
     turn, since gaits differ in cost and neighbors are alike. Angles need not be within 0-360.
@@ -71,12 +73,13 @@ def speeds(
     n = gaits.shape[0]
     flats = [plant(model)] * n if isinstance(model, (Model, Plant)) else [plant(one) for one in model]
     count = workers or cores()
-    full = _LANES_FULL * lanes.width() if lanes.width() > 1 else 1  # with fewer walks in a call, lanes are idle
+    width = lanes.width(single)
+    full = _LANES_FULL * width if width > 1 else 1  # with fewer walks in a call, lanes are idle
     pieces = max(1, min(_PIECES_PER_WORKER * count, -(-n // full))) if executor or count > 1 else 1
     shares = [slice(first, None, pieces) for first in range(min(pieces, n))]
     if executor is None and len(shares) > 1:
         executor = _pool(count)
-    run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s, settled, looser)
+    run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s, settled, looser, single)
     each: Callable[..., Any] = executor.map if executor else map
     found = each(run, [flats[share] for share in shares], [gaits[share] for share in shares])
     advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
@@ -93,6 +96,7 @@ def _progress(
     dead_time_s: float,
     settled: float,
     looser: float,
+    single: bool,
     flats: Sequence[Plant],
     gaits: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -100,7 +104,7 @@ def _progress(
     ways = [rigs.pipe(flat, inclination_deg, terrain, looser=looser) for flat in flats]
     ends = gaits[:, :1] * np.arange(1, cycles + 1)
     switches = gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)
-    what = lanes.Experiment(lanes.PROGRESS, ways, switches, list(ends), tolerance_m, settled=settled)
+    what = lanes.Experiment(lanes.PROGRESS, ways, switches, list(ends), tolerance_m, settled=settled, single=single)
     rows = np.array(lanes.march(flats, what, together=False))
     starts = np.array([flat.q[layout.BODY + layout.CONTRACTED] for flat in flats])
     return np.diff(rows[:, 0], prepend=starts[:, None]), np.diff(rows[:, 1], prepend=0.0)

@@ -37,13 +37,13 @@ SEEN_OF_WALK = [X_HEAD, V_HEAD, X_TAIL, V_TAIL, READ_BODY, READ_BODY + 1, READ_B
 _PROGRESS_OF_WALK = [X_HEAD, SLIP]
 
 
-def width() -> int:
-    """Number of simulations that run side by side."""
+def width(single: bool = False) -> int:
+    """Number of simulations that run side by side, in double or in `single` precision."""
     found = kernels()
-    return found[0].lanes if found else 1
+    return found[2 if single else 0].lanes if found else 1
 
 
-def _kernels_for(plants: Sequence[Plant]) -> tuple[Kernel, Kernel] | None:
+def _kernels_for(plants: Sequence[Plant]) -> tuple[Kernel, Kernel, Kernel] | None:
     found = kernels()
     return found if found and not any(plant.active & found[0].refused for plant in plants) else None
 
@@ -57,10 +57,11 @@ def march(plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.
     found = _kernels_for(plants)
     if found is None:
         return [in_numba(what, k, plant) for k, plant in enumerate(plants)]
-    many, one = found
+    many, one, single = found
     if together and len(plants) > 1:
         return _around_the_first(many, plants, what)
-    return (one if len(plants) < _WORTH_LANES else many).march(plants, what, False)
+    side_by_side = single if what.single else many
+    return (one if len(plants) < _WORTH_LANES else side_by_side).march(plants, what, False)
 
 
 def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment) -> list[np.ndarray]:

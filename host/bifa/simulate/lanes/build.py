@@ -17,6 +17,7 @@ from bifa.simulate import entries, generated
 FLAGS = (
     "-O2", "-std=gnu11", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast", "-w",
 )  # fmt: skip
+SINGLE = "-DSINGLE"
 HERE = Path(__file__).parent
 _OWN = ("translate.py", "program.py", "vectors.h", "tables.h", "drive.c")
 
@@ -50,9 +51,15 @@ def target() -> Target:
     return next(one for one in TARGETS if all(has.get(feature) for feature in one.needs))
 
 
-def single() -> Target:
+def one_lane() -> Target:
     """A target with one lane, for this processor."""
     return Target(1, target().flags if target().lanes > 2 else (), ())
+
+
+def single_precision() -> Target:
+    """The widest target in single precision, with twice the lanes. Without AVX it would be slower than double."""
+    double = target()
+    return Target(2 * double.lanes, (*double.flags, SINGLE), double.needs) if double.needs else double
 
 
 def compiler() -> list[str]:
@@ -71,7 +78,8 @@ def library(chosen: Target) -> Path:
     path = generated.folder() / name
     if not path.exists():
         compiler()
-        print(f"Compiling the {chosen.lanes}-lane simulator (first run only)...", file=sys.stderr, flush=True)
+        what = f"{chosen.lanes}-lane{' single-precision' if SINGLE in chosen.flags else ''} simulator"
+        print(f"Compiling the {what} (first run only)...", file=sys.stderr, flush=True)
         compile_to(path, chosen)
         generated.forget_old(path.parent)
     return path

@@ -52,7 +52,7 @@ class Experiment:
     """An experiment on several robots: mounting, switches and sample times of each, and the settings common to all.
 
     settled: share of the advance by which three successive cycles of a `PROGRESS` may differ for the rest to be
-    extrapolated; 0 to simulate all.
+    extrapolated; 0 to simulate all. single: in single precision, where there are kernels.
     """
 
     kind: int
@@ -64,6 +64,7 @@ class Experiment:
     rate_m_s: float = 0.0
     load_cell_N_m: float = 0.0
     settled: float = 0.0
+    single: bool = False
 
 
 class Kernel:
@@ -177,16 +178,17 @@ def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
 
 
 @cache
-def kernels() -> tuple[Kernel, Kernel] | None:
-    """A kernel with this processor's lanes and one with a single lane. None if BIFA_LANES is 0, or if they cannot be
-    compiled or loaded, which is then reported once."""
+def kernels() -> tuple[Kernel, Kernel, Kernel] | None:
+    """A kernel with this processor's lanes, one with a single lane, and one in single precision with twice the lanes.
+    None if BIFA_LANES is 0, or if they cannot be compiled or loaded, which is then reported once."""
     if os.environ.get("BIFA_LANES") == "0":
         return None
+    targets = build.target(), build.one_lane(), build.single_precision()
     try:
-        found = Kernel(build.library(build.target())), Kernel(build.library(build.single()))
+        many, one, single = (Kernel(build.library(chosen)) for chosen in targets)
     except build.NoKernelError as e:
         print(f"bifa: simulations run one at a time, in numba (a minute to compile at first): {e}", file=sys.stderr)
         return None
-    if found[0].refused:
-        print(f"bifa: these effects cannot be vectorised and run serially: {found[0].refusals}", file=sys.stderr)
-    return found
+    if many.refused:
+        print(f"bifa: these effects cannot be vectorised and run serially: {many.refusals}", file=sys.stderr)
+    return many, one, single

@@ -81,7 +81,25 @@ MERGED Three reach_of(const Curve *curve) { return (Three){curve->lower, curve->
 // The four coefficients in each lane's own row.
 MERGED Four row_of(const Curve *curve, V row) {
     const V place = v_min(v_max(splat(1.0), row), splat((double)(curve->count - 1)));
-#if LANES == 8 && defined(__AVX512F__)
+#if defined(SINGLE) && defined(OP)
+    int at[LANES] __attribute__((aligned(64)));
+#define ROW(i) _mm256_cvtpd_ps(_mm256_loadu_pd(curve->rows[i] + at[i]))
+#ifdef USE_AVX512
+    _mm512_store_si512(at, _mm512_slli_epi32(_mm512_cvttps_epi32(place), 2));
+#define PAIR(i, j) _mm512_insertf32x4(_mm512_castps128_ps512(ROW(i)), ROW(j), 1)
+#define ROWS(i) _mm512_insertf32x4(_mm512_insertf32x4(PAIR(i, i + 4), ROW(i + 8), 2), ROW(i + 12), 3)
+#define TWICE(name, a, b) _mm512_castpd_ps(_mm512_##name##_pd(_mm512_castps_pd(a), _mm512_castps_pd(b)))
+#else
+    _mm256_store_si256((__m256i *)at, _mm256_slli_epi32(_mm256_cvttps_epi32(place), 2));
+#define ROWS(i) _mm256_insertf128_ps(_mm256_castps128_ps256(ROW(i)), ROW(i + 4), 1)
+#define TWICE(name, a, b) _mm256_castpd_ps(_mm256_##name##_pd(_mm256_castps_pd(a), _mm256_castps_pd(b)))
+#endif
+    const V a = ROWS(0), b = ROWS(1), c = ROWS(2), d = ROWS(3);
+    const V low_ab = OP(unpacklo)(a, b), high_ab = OP(unpackhi)(a, b);
+    const V low_cd = OP(unpacklo)(c, d), high_cd = OP(unpackhi)(c, d);
+    return (Four){TWICE(unpacklo, low_ab, low_cd), TWICE(unpackhi, low_ab, low_cd),
+                  TWICE(unpacklo, high_ab, high_cd), TWICE(unpackhi, high_ab, high_cd)};
+#elif defined(USE_AVX512)
     int64_t at[8] __attribute__((aligned(64)));
     _mm512_store_si512(at, _mm512_slli_epi64(_mm512_cvttpd_epi64(place), 2));
 #define PAIR(i, j)                                                                         \
@@ -94,7 +112,7 @@ MERGED Four row_of(const Curve *curve, V row) {
     const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
     return (Four){_mm512_permutex2var_pd(even_ab, low, even_cd), _mm512_permutex2var_pd(odd_ab, low, odd_cd),
                   _mm512_permutex2var_pd(even_ab, high, even_cd), _mm512_permutex2var_pd(odd_ab, high, odd_cd)};
-#elif LANES == 4 && defined(__AVX2__)
+#elif defined(USE_AVX2)
     int at[4] __attribute__((aligned(16)));
     _mm_store_si128((__m128i *)at, _mm_slli_epi32(_mm256_cvttpd_epi32(place), 2));
 #define ROW(i) _mm256_loadu_pd(curve->rows[i] + at[i])
@@ -120,10 +138,10 @@ MERGED Four row_of(const Curve *curve, V row) {
 MERGED V learnt_entry(const Learnt *table, V row, V column) {
     const V term = v_min(v_max(splat(0.0), row), splat((double)(table->terms - 1)));
     const V place = v_min(v_max(splat(0.0), column), splat((double)(table->columns - 1)));
-#if LANES == 8 && defined(__AVX512F__)
+#if defined(USE_AVX512) && !defined(SINGLE)
     const __m512i at = _mm512_cvttpd_epi64(term * splat((double)table->columns) + place);
     return _mm512_i64gather_pd(_mm512_add_epi64(_mm512_loadu_si512(table->rows), _mm512_slli_epi64(at, 3)), NULL, 1);
-#elif LANES == 4 && defined(__AVX2__)
+#elif defined(USE_AVX2) && !defined(SINGLE)
     const __m256i at = _mm256_cvtepi32_epi64(_mm256_cvttpd_epi32(term * splat((double)table->columns) + place));
     const __m256i *rows = (const __m256i *)table->rows;
     return _mm256_i64gather_pd(NULL, _mm256_add_epi64(_mm256_loadu_si256(rows), _mm256_slli_epi64(at, 3)), 1);

@@ -8,71 +8,100 @@
 #define MERGED static inline __attribute__((always_inline))
 #define INNER static __attribute__((noinline))
 
-#if LANES == 8 && defined(__AVX512F__) && defined(__AVX512DQ__)
+// A number is a double, or a float in single precision (SINGLE). WIDTH: of a vector, in bits.
+#ifdef SINGLE
+typedef float Number;
+typedef int32_t Whole;
+#define NUMBER_BITS 32
+#define SUFFIXED(name) name##_ps
+#else
+typedef double Number;
+typedef int64_t Whole;
+#define NUMBER_BITS 64
+#define SUFFIXED(name) name##_pd
+#endif
+#define WIDTH (LANES * NUMBER_BITS)
+
+#if WIDTH == 512 && defined(__AVX512F__) && defined(__AVX512DQ__)
+#define USE_AVX512
 #include <immintrin.h>
+#define OP(name) SUFFIXED(_mm512_##name)
+#ifdef SINGLE
+typedef __m512 V;
+typedef __mmask16 Mask;
+#define COMPARED(a, sign, b, predicate) _mm512_cmp_ps_mask(a, b, predicate)
+#else
 typedef __m512d V;
 typedef __mmask8 Mask;
-typedef __m512i Bits;
-MERGED V splat(double x) { return _mm512_set1_pd(x); }
 #define COMPARED(a, sign, b, predicate) _mm512_cmp_pd_mask(a, b, predicate)
+#endif
+MERGED V splat(Number x) { return OP(set1)(x); }
 MERGED Mask and_(Mask a, Mask b) { return (Mask)(a & b); }
 MERGED Mask or_(Mask a, Mask b) { return (Mask)(a | b); }
 MERGED Mask not_(Mask a) { return (Mask)~a; }
 MERGED Mask andnot(Mask a, Mask b) { return (Mask)(~a & b); }
 MERGED Mask no_lanes(void) { return 0; }
-MERGED Mask all_lanes(void) { return 0xFF; }
+MERGED Mask all_lanes(void) { return (Mask)-1; }
 MERGED Mask lane(int i) { return (Mask)(1 << i); }
 MERGED int any(Mask m) { return m != 0; }
 MERGED unsigned bits_of(Mask m) { return m; }
-MERGED V sel(Mask m, V a, V b) { return _mm512_mask_blend_pd(m, b, a); }
+MERGED V sel(Mask m, V a, V b) { return OP(mask_blend)(m, b, a); }
 MERGED Mask sel_mask(Mask m, Mask a, Mask b) { return (Mask)((m & a) | (~m & b)); }
-MERGED V v_sqrt(V x) { return _mm512_sqrt_pd(x); }
-MERGED V v_fma(V a, V b, V c) { return _mm512_fmadd_pd(a, b, c); }
-MERGED V v_trunc(V x) { return _mm512_roundscale_pd(x, _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC); }
-MERGED V v_floor(V x) { return _mm512_roundscale_pd(x, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
-MERGED V v_ceil(V x) { return _mm512_roundscale_pd(x, _MM_FROUND_TO_POS_INF | _MM_FROUND_NO_EXC); }
-MERGED V v_nearest(V x) { return _mm512_roundscale_pd(x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
-MERGED V v_fabs(V x) { return _mm512_abs_pd(x); }
-MERGED V v_max(V a, V b) { return _mm512_max_pd(b, a); } // if either is NaN, the first argument, as in Python
-MERGED V v_min(V a, V b) { return _mm512_min_pd(b, a); }
-MERGED V v_scaled(V x, V power) { return _mm512_scalef_pd(x, power); }
+MERGED V v_sqrt(V x) { return OP(sqrt)(x); }
+MERGED V v_fma(V a, V b, V c) { return OP(fmadd)(a, b, c); }
+MERGED V v_trunc(V x) { return OP(roundscale)(x, _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC); }
+MERGED V v_floor(V x) { return OP(roundscale)(x, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
+MERGED V v_ceil(V x) { return OP(roundscale)(x, _MM_FROUND_TO_POS_INF | _MM_FROUND_NO_EXC); }
+MERGED V v_nearest(V x) { return OP(roundscale)(x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
+MERGED V v_fabs(V x) { return OP(abs)(x); }
+MERGED V v_max(V a, V b) { return OP(max)(b, a); } // if either is NaN, the first argument, as in Python
+MERGED V v_min(V a, V b) { return OP(min)(b, a); }
+MERGED V v_scaled(V x, V power) { return OP(scalef)(x, power); }
 
-#elif LANES == 4 && defined(__AVX2__) && defined(__FMA__)
+#elif WIDTH == 256 && defined(__AVX2__) && defined(__FMA__)
+#define USE_AVX2
 #include <immintrin.h>
+#define OP(name) SUFFIXED(_mm256_##name)
+#ifdef SINGLE
+typedef __m256 V;
+#else
 typedef __m256d V;
-typedef __m256d Mask;
-MERGED V splat(double x) { return _mm256_set1_pd(x); }
-#define COMPARED(a, sign, b, predicate) _mm256_cmp_pd(a, b, predicate)
-MERGED Mask and_(Mask a, Mask b) { return _mm256_and_pd(a, b); }
-MERGED Mask or_(Mask a, Mask b) { return _mm256_or_pd(a, b); }
-MERGED Mask andnot(Mask a, Mask b) { return _mm256_andnot_pd(a, b); }
-MERGED Mask no_lanes(void) { return _mm256_setzero_pd(); }
-MERGED Mask all_lanes(void) { return _mm256_castsi256_pd(_mm256_set1_epi64x(-1)); }
-MERGED Mask not_(Mask a) { return _mm256_andnot_pd(a, all_lanes()); }
+#endif
+typedef V Mask;
+typedef Whole Bits __attribute__((vector_size(32)));
+MERGED V splat(Number x) { return OP(set1)(x); }
+#define COMPARED(a, sign, b, predicate) OP(cmp)(a, b, predicate)
+MERGED Mask and_(Mask a, Mask b) { return OP(and)(a, b); }
+MERGED Mask or_(Mask a, Mask b) { return OP(or)(a, b); }
+MERGED Mask andnot(Mask a, Mask b) { return OP(andnot)(a, b); }
+MERGED Mask no_lanes(void) { return OP(setzero)(); }
+MERGED Mask all_lanes(void) { return (Mask) ~(Bits){0}; }
+MERGED Mask not_(Mask a) { return OP(andnot)(a, all_lanes()); }
 MERGED Mask lane(int i) {
-    return _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_set_epi64x(3, 2, 1, 0), _mm256_set1_epi64x(i)));
+    Bits m = {0};
+    m[i] = -1;
+    return (Mask)m;
 }
-MERGED int any(Mask m) { return _mm256_movemask_pd(m) != 0; }
-MERGED unsigned bits_of(Mask m) { return (unsigned)_mm256_movemask_pd(m); }
-MERGED V sel(Mask m, V a, V b) { return _mm256_blendv_pd(b, a, m); }
-MERGED Mask sel_mask(Mask m, Mask a, Mask b) { return _mm256_blendv_pd(b, a, m); }
-MERGED V v_sqrt(V x) { return _mm256_sqrt_pd(x); }
-MERGED V v_fma(V a, V b, V c) { return _mm256_fmadd_pd(a, b, c); }
-MERGED V v_trunc(V x) { return _mm256_round_pd(x, _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC); }
-MERGED V v_floor(V x) { return _mm256_floor_pd(x); }
-MERGED V v_ceil(V x) { return _mm256_ceil_pd(x); }
-MERGED V v_nearest(V x) { return _mm256_round_pd(x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
-MERGED V v_fabs(V x) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), x); }
-MERGED V v_max(V a, V b) { return _mm256_max_pd(b, a); }
-MERGED V v_min(V a, V b) { return _mm256_min_pd(b, a); }
+MERGED int any(Mask m) { return OP(movemask)(m) != 0; }
+MERGED unsigned bits_of(Mask m) { return (unsigned)OP(movemask)(m); }
+MERGED V sel(Mask m, V a, V b) { return OP(blendv)(b, a, m); }
+MERGED Mask sel_mask(Mask m, Mask a, Mask b) { return OP(blendv)(b, a, m); }
+MERGED V v_sqrt(V x) { return OP(sqrt)(x); }
+MERGED V v_fma(V a, V b, V c) { return OP(fmadd)(a, b, c); }
+MERGED V v_trunc(V x) { return OP(round)(x, _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC); }
+MERGED V v_floor(V x) { return OP(floor)(x); }
+MERGED V v_ceil(V x) { return OP(ceil)(x); }
+MERGED V v_nearest(V x) { return OP(round)(x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
+MERGED V v_fabs(V x) { return OP(andnot)(OP(set1)(-0.0), x); }
+MERGED V v_max(V a, V b) { return OP(max)(b, a); }
+MERGED V v_min(V a, V b) { return OP(min)(b, a); }
 #define POWER_BY_BITS
-typedef int64_t Bits __attribute__((vector_size(32)));
 
 #elif LANES == 1
-typedef double V;
+typedef Number V;
 typedef int Mask;
-typedef int64_t Bits;
-MERGED V splat(double x) { return x; }
+typedef Whole Bits;
+MERGED V splat(Number x) { return x; }
 #define COMPARED(a, sign, b, predicate) (a sign b)
 MERGED Mask and_(Mask a, Mask b) { return a & b; }
 MERGED Mask or_(Mask a, Mask b) { return a | b; }
@@ -97,10 +126,10 @@ MERGED V v_min(V a, V b) { return b < a ? b : a; }
 #define POWER_BY_BITS
 
 #else // the compiler maps these vectors to the processor's
-typedef double V __attribute__((vector_size(8 * LANES)));
-typedef int64_t Mask __attribute__((vector_size(8 * LANES)));
+typedef Number V __attribute__((vector_size(WIDTH / 8)));
+typedef Whole Mask __attribute__((vector_size(WIDTH / 8)));
 typedef Mask Bits;
-MERGED V splat(double x) { return x - (V){0}; }
+MERGED V splat(Number x) { return x - (V){0}; }
 #define COMPARED(a, sign, b, predicate) (a sign b)
 MERGED Mask and_(Mask a, Mask b) { return a & b; }
 MERGED Mask or_(Mask a, Mask b) { return a | b; }
@@ -132,7 +161,7 @@ EACH(v_floor, floor)
 EACH(v_ceil, ceil)
 EACH(v_nearest, nearbyint)
 MERGED V v_fma(V a, V b, V c) { return a * b + c; }
-MERGED V v_fabs(V x) { return (V)((Mask)x & (all_lanes() ^ (Mask)splat(-0.0))); }
+MERGED V v_fabs(V x) { return (V)((Mask)x & (all_lanes() ^ (Mask)splat((Number)-0.0))); }
 MERGED V v_max(V a, V b) { return sel(b > a, b, a); }
 MERGED V v_min(V a, V b) { return sel(b < a, b, a); }
 #define POWER_BY_BITS
@@ -159,13 +188,29 @@ MERGED Mask finite_(V x) { return lt(v_fabs(x), splat(INFINITY)); }
 MERGED double max_f(double a, double b) { return b > a ? b : a; }
 MERGED double min_f(double a, double b) { return b < a ? b : a; }
 
+#ifdef SINGLE
+#define MANTISSA 23
+#define BIAS 127
+#define LEAST_EXPONENT (-87.0f)
+#define MOST_EXPONENT 88.0f
+#define LN2_HIGH 0x1.62e4p-1f // with so few digits that its multiples are exact
+#define LN2_LOW 0x1.7f7d1cp-20f
+#else
+#define MANTISSA 52
+#define BIAS 1023
+#define LEAST_EXPONENT (-708.0)
+#define MOST_EXPONENT 709.0
+#define LN2_HIGH 0x1.62e42feep-1
+#define LN2_LOW 0x1.a39ef35793c76p-33
+#endif
+
 #ifdef POWER_BY_BITS
-// x 2^power for integer powers from -1022 to 1023
+// x 2^power for integer powers whose result is a normal number
 MERGED V v_scaled(V x, V power) {
-    V shifted = power + splat(0x1.8p52 + 1023.0);
+    V shifted = power + splat((Number)(1.5 * ((Whole)1 << MANTISSA)) + BIAS);
     Bits bits;
     memcpy(&bits, &shifted, sizeof bits);
-    bits = (Bits)(bits << 52);
+    bits = (Bits)(bits << MANTISSA);
     memcpy(&shifted, &bits, sizeof bits);
     return x * shifted;
 }
@@ -173,33 +218,44 @@ MERGED V v_scaled(V x, V power) {
 
 // e^x to within one ulp: x is reduced by a multiple of ln 2 to at most 0.347, then a Taylor series by Estrin's scheme.
 MERGED V v_exp(V x) {
-    const V bounded = v_min(v_max(x, splat(-708.0)), splat(709.0));
+    const V bounded = v_min(v_max(x, splat(LEAST_EXPONENT)), splat(MOST_EXPONENT));
     const V n = v_nearest(bounded * splat(0x1.71547652b82fep0));
-    V r = v_fma(n, splat(-0x1.62e42feep-1), bounded);
-    r = v_fma(n, splat(-0x1.a39ef35793c76p-33), r);
-    const V r2 = r * r, r4 = r2 * r2;
+    V r = v_fma(n, splat(-LN2_HIGH), bounded);
+    r = v_fma(n, splat(-LN2_LOW), r);
+    const V r2 = r * r;
     const V a = v_fma(r, splat(1.0 / 6), splat(0.5));
     const V b = v_fma(r, splat(1.0 / 120), splat(1.0 / 24));
     const V c = v_fma(r, splat(1.0 / 5040), splat(1.0 / 720));
+#ifdef SINGLE
+    V sum = v_fma(r2, v_fma(r2, c, b), a); // (e^r - 1 - r) / r^2
+#else
+    const V r4 = r2 * r2;
     const V d = v_fma(r, splat(1.0 / 362880), splat(1.0 / 40320));
     const V e = v_fma(r, splat(1.0 / 39916800), splat(1.0 / 3628800));
     const V f = v_fma(r, splat(1.0 / 6227020800), splat(1.0 / 479001600));
     const V low = v_fma(r2, b, a), high = v_fma(r2, d, c), top = v_fma(r2, f, e);
     V sum = v_fma(r4, v_fma(r4, top, high), low); // (e^r - 1 - r) / r^2
+#endif
     sum = v_fma(r2, sum, r) + splat(1.0);
     V grown = v_scaled(sum, n);
-    grown = sel(lt(x, splat(-708.0)), splat(0.0), grown);
-    grown = sel(gt(x, splat(709.0)), splat(INFINITY), grown);
+    grown = sel(lt(x, splat(LEAST_EXPONENT)), splat(0.0), grown);
+    grown = sel(gt(x, splat(MOST_EXPONENT)), splat(INFINITY), grown);
     return sel(ne(x, x), x, grown);
 }
 
 // These functions are rarely used: glibc's vector versions where available, otherwise one lane at a time.
-#if defined(__x86_64__) && defined(__GLIBC__) && LANES == 8 && defined(__AVX512F__)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(USE_AVX512) && !defined(SINGLE)
 #define FROM_GLIBC(name) _ZGVeN8v_##name
 #define FROM_GLIBC_2(name) _ZGVeN8vv_##name
-#elif defined(__x86_64__) && defined(__GLIBC__) && LANES == 4 && defined(__AVX2__)
+#elif defined(__x86_64__) && defined(__GLIBC__) && defined(USE_AVX512)
+#define FROM_GLIBC(name) _ZGVeN16v_##name##f
+#define FROM_GLIBC_2(name) _ZGVeN16vv_##name##f
+#elif defined(__x86_64__) && defined(__GLIBC__) && defined(USE_AVX2) && !defined(SINGLE)
 #define FROM_GLIBC(name) _ZGVdN4v_##name
 #define FROM_GLIBC_2(name) _ZGVdN4vv_##name
+#elif defined(__x86_64__) && defined(__GLIBC__) && defined(USE_AVX2)
+#define FROM_GLIBC(name) _ZGVdN8v_##name##f
+#define FROM_GLIBC_2(name) _ZGVdN8vv_##name##f
 #endif
 #define ONE_BY_ONE(name)                                                      \
     MERGED V v_##name(V x) {                                                  \
