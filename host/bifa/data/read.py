@@ -222,7 +222,7 @@ def _inside(folder: Path, head: dict[str, Any], fields: Fields, exports: Mapping
     file = head["file"]
     if PurePosixPath(file).is_absolute() or PureWindowsPath(file).anchor or ".." in Path(file).parts:
         raise fields.error("file", f"{file!r} is outside the data set; name a file within the folder")
-    if not file.endswith(".csv") and ROLES[head["experiment"]] not in exports:
+    if not file.lower().endswith(".csv") and ROLES[head["experiment"]] not in exports:
         raise fields.error("file", f"{file!r} is not a .csv file")
     try:
         resolved = (folder / file).resolve()

@@ -150,8 +150,8 @@ def _never_off(system: System) -> list[str]:
 
 
 def _unused(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> list[str]:
-    """Warnings of effects that change no prediction at any of the sizes at which fits start."""
-    found = []
+    """A warning of the effects that change no prediction at any of the sizes at which fits start, if there are any."""
+    unused = []
     for name, effect in system.effects.items():
         sizes = [
             {
@@ -168,11 +168,15 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
             for t in seen
             for size in sizes
         ):
-            found.append(
-                f"Effect {name} changes no prediction at any of its start sizes: does the model use it, and do these"
-                " records excite it?"
-            )
-    return found
+            unused.append(name)
+    if not unused:
+        return []
+    which, it = (
+        (f"Effect {unused[0]} changes", "it") if len(unused) == 1 else (f"Effects {', '.join(unused)} change", "them")
+    )
+    return [
+        f"{which} no prediction at any of the start sizes: does the model use {it}, and do these records excite {it}?"
+    ]
 
 
 def predict_unchecked(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:

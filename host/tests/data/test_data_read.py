@@ -285,3 +285,10 @@ def test_a_folder_or_a_pipe_is_not_opened(folder):
         with pytest.raises(DatasetError, match="not a regular file"):
             read_dataset(folder)
         unmake(folder / WALK)
+
+
+def test_an_ending_in_capitals_is_the_same(folder):
+    (folder / WALK).rename(folder / "locomotion_1.CSV")
+    path = folder / "dataset.toml"
+    path.write_text(path.read_text().replace(WALK, "locomotion_1.CSV"))
+    assert [trial.file for trial in read_dataset(folder).trials].count("locomotion_1.CSV") == 1

@@ -73,7 +73,11 @@ def test_what_is_in_every_set_of_weight_is_named_however_little_is_closed_by_the
     assert all(e.share_of_gap >= 0.0 for e in found.effects)
 
 
-def test_an_effect_that_the_model_never_uses_is_pointed_out():
+@pytest.mark.parametrize(
+    ("forgotten", "which", "it"),
+    [(("lost",), "Effect lost changes", "it"), (("lost", "left"), "Effects lost, left change", "them")],
+)
+def test_effects_that_the_model_never_uses_are_pointed_out(forgotten, which, it):
     def simulate(record, theta):
         return {"y": theta.gain * record["u"] + theta.used.per * record["u"] ** 2}
 
@@ -81,10 +85,9 @@ def test_an_effect_that_the_model_never_uses_is_pointed_out():
     for _ in range(6):
         u = draw.uniform(-1, 1, 100)
         records.append({"time_s": np.arange(100.0), "u": u, "y": 2.0 * u + 0.05 * draw.standard_normal(100)})
-    effects = [Effect(name, Parameter("per", "1", 0.3, -5.0, 5.0)) for name in ("used", "forgotten")]
+    effects = [Effect(name, Parameter("per", "1", 0.3, -5.0, 5.0)) for name in ("used", *forgotten)]
     assert said_of(records, lacuna.System(simulate, GAIN, effects)) == (
-        "Effect forgotten changes no prediction at any of its start sizes: does the model use it, and do these"
-        " records excite it?",
+        f"{which} no prediction at any of the start sizes: does the model use {it}, and do these records excite {it}?",
     )
 
 
