@@ -176,7 +176,7 @@ def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folde
     flat, settings = plant(robot), optimum.settings
     # The same robots as in the verification: near a cliff, other robots would give different results.
     robots = SearchRun(robot, pool, optimum.spread, settings).verifying_robots()
-    metric = replace(settings.rules.in_full(), tolerance_m=FINE_M)
+    metric = replace(settings.rules, tolerance_m=FINE_M)
     before, after = anatomy(robot, BASELINE), anatomy(robot, optimum.gait)
     walks = [
         Walk(f"{title}: {one.speed_mm_s:.1f} mm/s", one.gait.period_s, {SIMULATED: one.record.columns})

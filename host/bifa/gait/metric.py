@@ -81,17 +81,15 @@ class Metric:
     def finer(self) -> "Metric":
         """Return the metric for finalists: twenty cycles, all simulated and the last ten judged, and a far smaller
         step, in double precision."""
-        return replace(self, cycles=20, judged=10, tolerance_m=1e-7, settled=0.0, single=False).in_full()
-
-    def in_full(self) -> "Metric":
-        """Return the metric with all the cycles of a measured walk, the second half judged, if walks never settle: with
-        a tether a gait may fail as late as after sixteen cycles."""
-        return replace(self, cycles=MAX_CYCLES, judged=MAX_CYCLES // 2) if self.unlike else self
+        return replace(self._over(20, 10), tolerance_m=1e-7, settled=0.0, single=False)
 
     def quicker(self) -> "Metric":
         """Return the metric for searches over many draws: six cycles, longer steps; the gaits it accepts are judged
-        again. Walks that never settle keep all their cycles: with six, a search ends at gaits that all fail later."""
-        return replace(self, cycles=6, judged=2, periodic=max(self.periodic, 5e-3), tolerance_m=3e-5).in_full()
+        again."""
+        return replace(self._over(6, 2), periodic=max(self.periodic, 5e-3), tolerance_m=3e-5)
+
+    def _over(self, cycles: int, judged: int) -> "Metric":
+        return self if self.unlike else replace(self, cycles=cycles, judged=judged)
 
     def of_draws(self) -> "Metric":
         """Return the metric for drawn robots and, in a robust search, the model itself: they may slip, and their cycles
@@ -99,8 +97,11 @@ class Metric:
         return replace(self, periodic=_MAX_VARIATION, slip_m=np.inf)
 
     def of_unlike_cycles(self) -> "Metric":
-        """Return the metric for a robot that never walks the same cycle twice."""
-        return replace(self, periodic=_MAX_VARIATION, unlike=True, settled=0.0)
+        """Return the metric for a robot that never walks the same cycle twice: always all the cycles of a measured
+        walk, the second half judged. With a tether a gait may fail as late as after sixteen cycles, and over a few
+        cycles of a ripple gaits look fast that are not."""
+        whole = self._over(MAX_CYCLES, MAX_CYCLES // 2)
+        return replace(whole, periodic=_MAX_VARIATION, unlike=True, settled=0.0)
 
     def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""
@@ -139,10 +140,6 @@ class Passage:
     def finer(self) -> "Passage":
         """Return the metric for finalists: a smaller step, in double precision."""
         return replace(self, tolerance_m=1e-6, single=False)
-
-    def in_full(self) -> "Passage":
-        """Return the same metric: a tunnel is passed or not."""
-        return self
 
     def quicker(self) -> "Passage":
         """Return the metric with longer steps and as many cycles, since the tunnel has to be passed."""

@@ -167,7 +167,7 @@ class SearchRun:
         """Return the objective of a round, on robots of its own."""
         settings = self.settings
         draws = self.robots(stage.draws, settings.seed + 500_000 * number)
-        metric = replace(settings.metric.in_full(), tolerance_m=stage.tolerance_m)
+        metric = replace(settings.metric, tolerance_m=stage.tolerance_m)
         share = stage.quantile * settings.share / QUANTILE
         nominal, space = plant(self.model), settings.space
         return RobustSpeed(self.runs, nominal, draws, space, metric, share, stage.abandon, stage.jitter)
@@ -231,7 +231,7 @@ def optimize(
     else:
         refined = [_refine(search, own, explored)] if settings.refine else []
         gait, nominal = _fastest_finalist(search, explored.joined(*refined))
-    verifying, finest = search.verifying_robots(), replace(metric.in_full(), tolerance_m=FINE_M)
+    verifying, finest = search.verifying_robots(), replace(metric, tolerance_m=FINE_M)
     speeds = distribution(runs, verifying, gait_rows([gait]), finest)[0]
     search.on_progress("verify", 1.0, nominal)
     return Optimum(
@@ -253,7 +253,7 @@ def _predicted(search: SearchRun, gait: Gait, speeds: np.ndarray) -> Prediction:
     metric = search.settings.metric
     if not (isinstance(metric, Metric) and metric.is_plain):
         return Prediction(speeds, metric.cycles)
-    cycles = max(CYCLES, metric.in_full().cycles)
+    cycles = max(CYCLES, metric.cycles)
     return predict_speed(search.model, search.known, gait, seed=search.settings.seed, cycles=cycles)
 
 
@@ -370,7 +370,7 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
     checking = search.robots(_CHECKING_DRAWS, settings.seed + 2_500_000)
-    metric = replace(settings.metric.in_full(), tolerance_m=FINE_M)
+    metric = replace(settings.metric, tolerance_m=FINE_M)
     # Relative to the best value of the shortlist, not to the gait's speed on the model, where it may have failed too.
     least = max(_WALK_RATIO * float(values.max()), STANDING_MM_S)
     near = np.concatenate([best, *(space.slower(best[:1], share) for share in _SLOWER)])

@@ -65,10 +65,9 @@ def test_what_never_settles_is_judged_in_full_by_the_second_half_of_what_is_walk
     """A gait that falls after sixteen cycles because of a tether was expected at 23.0 mm/s and walked at 20.5."""
     falling = progress([50] * 16 + [44] * 8)
     whole = Metric().of_unlike_cycles()
-    for metric in (whole.in_full(), whole.of_draws().in_full(), whole.finer(), whole.quicker()):
+    for metric in (whole, whole.of_draws(), whole.finer(), whole.quicker()):
         assert metric.cycles == 24
         assert metric.judge(falling).counted_mm_s == pytest.approx([23.0])
-    assert Metric().in_full() == Metric()
     assert Metric().finer().cycles == 20
     assert whole.settled == Metric().finer().settled == 0.0
 
