@@ -17,7 +17,7 @@ from bifa.robot import nominal
 from bifa.simulate import Plant, cores, gait_rows, plant
 
 NOMINAL_REQUIRED_MM_S, ROBUST_REQUIRED_MM_S = 23.4, 21.8
-REQUIRED_S = 10.0  # on two idle cores; half as long again with AVX2
+NOMINAL_REQUIRED_S, ROBUST_REQUIRED_S = 3.0, 5.0  # on two idle cores with AVX-512
 PAPER_MM_S = 23.3
 ROBOTS = int(os.environ.get("BIFA_BENCH_ROBOTS", "4"))
 SEEDS = range(int(os.environ.get("BIFA_BENCH_SEEDS", "2")))
@@ -30,9 +30,9 @@ def run() -> dict[str, float]:
     print(f"gait optimisation, {cores()} cores, {len(SEEDS)} seeds; load of the machine {os.getloadavg()[0]:.1f}")
     with simulations() as runs:
         _warm_up(model, runs)
-        for name, robust, required in (
-            ("nominal", False, NOMINAL_REQUIRED_MM_S),
-            ("robust", True, ROBUST_REQUIRED_MM_S),
+        for name, robust, required, required_s in (
+            ("nominal", False, NOMINAL_REQUIRED_MM_S, NOMINAL_REQUIRED_S),
+            ("robust", True, ROBUST_REQUIRED_MM_S, ROBUST_REQUIRED_S),
         ):
             speeds, seconds, processor = [], [], []
             for seed in SEEDS:
@@ -47,20 +47,21 @@ def run() -> dict[str, float]:
             shared = max(processor) / cores()
             print(
                 f"    at most {max(processor):.1f} s of processor, {shared:.1f} s on each of {cores()} cores; "
-                f"{max(seconds):.1f} s by the clock with what else ran (required {REQUIRED_S:g})"
+                f"{max(seconds):.1f} s by the clock with what else ran (required {required_s:g})"
             )
             print(f"    seeds within {100 * scatter:.2f} % (allowed 1)")
             figures |= {
                 f"gait_{name}_mm_s": min(speeds),
                 f"gait_{name}_required_mm_s": required,
                 f"gait_{name}_seconds": max(seconds),
+                f"gait_{name}_required_seconds": required_s,
                 f"gait_{name}_processor_seconds": max(processor),
                 f"gait_{name}_seconds_a_core": shared,
                 f"gait_{name}_seed_scatter": scatter,
             }
         figures |= _shortcuts(optimum, runs)
     figures |= regret.run(ROBOTS, len(SEEDS), 1)
-    return figures | {"gait_seconds_required": REQUIRED_S, "gait_paper_mm_s": PAPER_MM_S}
+    return figures | {"gait_paper_mm_s": PAPER_MM_S}
 
 
 def _shortcuts(optimum: Optimum, runs: Simulations) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Regret of gait searches against the best known gait, by robot and seed.
 
     python -m benchmarks.regret [--robots 60] [--seeds 5] [--long 5] [--fully 60] [--models DIR]
-                               [--records FILE] [--earlier FILE ...] [--print]
+                               [--records FILE] [--earlier FILE] [--print]
 
 Robots: the nominal one and the strong push, then specimens (5 % in every parameter) with each effect of the library at
 its usual size in turn, every tenth in a vertical pipe and every tenth before the tunnel; and every model-last.toml
@@ -11,8 +11,7 @@ of the peers (differential evolution, SciPy's DIRECT and SHGO) with as many eval
 (nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) Robust searches and
 peers take ten times as long as nominal searches: `--fully` sets on how many of the robots, evenly spread, they are
 run. FILE has one line per robot, with which a run resumes that was interrupted, had fewer seeds or searched fewer
-robots fully. The speeds in the FILES of earlier searches count among the best known in place of long runs and peers; of
-a robot that is in several of them, those in the last one.
+robots fully. The speeds in the FILE of an earlier search count among the best known in place of long runs and peers.
 """
 
 from __future__ import annotations
@@ -188,12 +187,12 @@ def run(
     kept: Path | None = None,
     only_print: bool = False,
     every: int | None = None,
-    earlier: Sequence[Path] = (),
+    earlier: Path | None = None,
 ) -> dict[str, float]:
     """Print the table, a line as each robot ends; return the figures flat. Ctrl-C ends with a summary of those done.
-    `every`: how many of the robots are searched fully; None: all. `earlier`: records of earlier searches."""
+    `every`: how many of the robots are searched fully; None: all. `earlier`: records of an earlier search."""
     known = lines.read(kept, "robot")
-    before = {name: known_before(one) for file in earlier for name, one in lines.read(file, "robot").items()}
+    before = {name: known_before(record) for name, record in lines.read(earlier, "robot").items()}
     print(HEADING)
     found: list[dict] = []
     asked = list(robots(count, models))
@@ -237,7 +236,7 @@ def main() -> None:
     parser.add_argument("--fully", type=int, help="number of robots with robust searches and peers; default: all")
     parser.add_argument("--models", type=Path, help="folder whose model-last.toml files are searched as well")
     parser.add_argument("--records", type=Path, help="one line of JSON per robot; read first, then kept up to date")
-    parser.add_argument("--earlier", type=Path, nargs="+", default=(), help="records of earlier searches")
+    parser.add_argument("--earlier", type=Path, help="records of an earlier search, whose speeds count among the known")
     parser.add_argument("--print", action="store_true", help="only print what is in the records")
     options = parser.parse_args()
     if options.print and options.records is None:
