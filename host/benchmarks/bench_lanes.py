@@ -28,7 +28,7 @@ def run() -> dict[str, float]:
     found = kernel.kernels()
     if found is None:
         return {}
-    many, one, _ = found
+    many, one = found
     print(f"{many.lanes} lanes; ms of the processor a simulation (best of {_TRIES})")
     print(f"{'':18s}   numba   C alone   together (times numba)   own steps (times numba)")
     figures: dict[str, float] = {"lanes_width": many.lanes, "lanes_compile_cpu_seconds": _compiled()}

@@ -12,7 +12,7 @@ import numpy as np
 
 from bifa.simulate import layout
 from bifa.simulate.entries import entries
-from bifa.simulate.lanes.kernel import ANCHOR, PROGRESS, SEEN, STEP, WALK, Experiment, Kernel, kernels
+from bifa.simulate.lanes.kernel import ANCHOR, PROGRESS, SEEN, STEP, WALK, Experiment, Kernel, kernels, single_precision
 from bifa.simulate.locomotion import READ_BODY, SLIP
 from bifa.simulate.plant import Plant
 from bifa.simulate.stepper import V_HEAD, V_TAIL, X_HEAD, X_TAIL, Mounting
@@ -40,10 +40,12 @@ _PROGRESS_OF_WALK = [X_HEAD, SLIP]
 def width(single: bool = False) -> int:
     """Number of simulations that run side by side, in double or in `single` precision."""
     found = kernels()
-    return found[2 if single else 0].lanes if found else 1
+    if not found:
+        return 1
+    return (single_precision(found[0]) if single else found[0]).lanes
 
 
-def _kernels_for(plants: Sequence[Plant]) -> tuple[Kernel, Kernel, Kernel] | None:
+def _kernels_for(plants: Sequence[Plant]) -> tuple[Kernel, Kernel] | None:
     found = kernels()
     return found if found and not any(plant.active & found[0].refused for plant in plants) else None
 
@@ -57,11 +59,12 @@ def march(plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.
     found = _kernels_for(plants)
     if found is None:
         return [in_numba(what, k, plant) for k, plant in enumerate(plants)]
-    many, one, single = found
+    many, one = found
     if together and len(plants) > 1:
         return _around_the_first(many, plants, what)
-    side_by_side = single if what.single else many
-    return (one if len(plants) < _WORTH_LANES else side_by_side).march(plants, what, False)
+    if len(plants) < _WORTH_LANES:
+        return one.march(plants, what, False)
+    return (single_precision(many) if what.single else many).march(plants, what, False)
 
 
 def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment) -> list[np.ndarray]:

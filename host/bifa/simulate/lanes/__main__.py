@@ -1,5 +1,6 @@
 """Compile the kernels for this processor unless they are cached: `python -m bifa.simulate.lanes`."""
 
-from bifa.simulate.lanes.kernel import kernels
+from bifa.simulate.lanes.kernel import kernels, single_precision
 
-kernels()
+if found := kernels():
+    single_precision(found[0])

@@ -178,17 +178,27 @@ def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
 
 
 @cache
-def kernels() -> tuple[Kernel, Kernel, Kernel] | None:
-    """A kernel with this processor's lanes, one with a single lane, and one in single precision with twice the lanes.
-    None if BIFA_LANES is 0, or if they cannot be compiled or loaded, which is then reported once."""
+def kernels() -> tuple[Kernel, Kernel] | None:
+    """A kernel with this processor's lanes and one with a single lane. None if BIFA_LANES is 0, or if they cannot be
+    compiled or loaded, which is then reported once."""
     if os.environ.get("BIFA_LANES") == "0":
         return None
-    targets = build.target(), build.one_lane(), build.single_precision()
     try:
-        many, one, single = (Kernel(build.library(chosen)) for chosen in targets)
+        found = Kernel(build.library(build.target())), Kernel(build.library(build.one_lane()))
     except build.NoKernelError as e:
         print(f"bifa: simulations run one at a time, in numba (a minute to compile at first): {e}", file=sys.stderr)
         return None
-    if many.refused:
-        print(f"bifa: these effects cannot be vectorised and run serially: {many.refusals}", file=sys.stderr)
-    return many, one, single
+    if found[0].refused:
+        print(f"bifa: these effects cannot be vectorised and run serially: {found[0].refusals}", file=sys.stderr)
+    return found
+
+
+@cache
+def single_precision(double: Kernel) -> Kernel:
+    """The kernel in single precision, compiled when a search first needs it. `double`, one of `kernels`, if it cannot
+    be compiled or loaded, which is then reported once."""
+    try:
+        return Kernel(build.library(build.single_precision()))
+    except build.NoKernelError as e:
+        print(f"bifa: searches run in double precision: {e}", file=sys.stderr)
+        return double
