@@ -202,8 +202,8 @@ class Uno:
         """Change one parameter and keep the others."""
         self.upload({name: value})
 
-    def upload(self, parameters: Mapping[str, float], save: str | None = None, wait: bool = False) -> None:
-        """Replace the parameter set as a whole and read it back; parameters not named keep their values.
+    def upload(self, parameters: Mapping[str, float], save: str | None = None, wait: bool = False) -> dict[str, float]:
+        """Replace the parameter set as a whole and return it as read back; parameters not named keep their values.
 
         A walking robot adopts the new set at the next cycle boundary; with `wait`, the call returns only then. `save`
         also keeps the set as a preset of that name. Raises UnoParameterError before anything is sent if a value is out
@@ -220,6 +220,7 @@ class Uno:
             self._wait_for_boundary(from_wire("period_s", wanted["period_s"]))
         if save is not None:
             self.save(save)
+        return {name: from_wire(name, value) for name, value in wanted.items()}
 
     def _wait_for_boundary(self, period_s: float) -> None:
         deadline = self._clock.now() + 2 * max(period_s, 60.0)

@@ -57,8 +57,9 @@ def record_trial(
                 raise
             raise DisturbedError(f"{error} ({status.why_stopped})") from None
         if not lost:
-            commanded_psi = uno.get("pressure_psi") if planned.pressure_psi is None else planned.pressure_psi
-            return planned.as_trial(columns, extra=extra | set_point(commanded_psi))
+            if planned.pressure_psi is not None:
+                extra |= set_point(planned.pressure_psi)
+            return planned.as_trial(columns, extra=extra)
         why = f"{lost} samples were lost on the link; check the cable, then resume the session"
     raise BifaError(f"{planned.title}{f', {attempts} attempts' if attempts > 1 else ''}: {why}")
 
@@ -138,7 +139,7 @@ def _walk(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
     period_s, cycles = planned.gait.period_s, planned.cycles
     uno.halt()
     mount(bench, uno, "locomotion", **planned.settings)
-    uno.upload({**planned.gait.as_dict(), **planned.parameters})
+    uploaded = uno.upload({**planned.gait.as_dict(), **planned.parameters})
     with Recording(bench, uno, on_progress) as tape:
         tape.wait(LEAD_S, report=False)
         uno.run()
@@ -148,7 +149,7 @@ def _walk(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
         "switch_error_s": TICK_S / 2,
         "command_age_s": PRESSURES_AFTER_S,
         "gait_ahead_s": TICK_S,  # the first switches are decided by the phases after the first step
-    }
+    } | set_point(uploaded["pressure_psi"])
     extra = noted(tape.clock) | camera_rate(tape.instrument_s) | known
     return _walk_columns(tape, period_s, cycles), extra, tape.lost_samples
 

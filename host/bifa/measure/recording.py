@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ from bifa.link.transport import Clock
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, align
 from bifa.measure.instruments import Instruments, are_asked, attend, until_ready
-from bifa.rig import Rig
+from bifa.rig import GONE, Rig
 
 LEAD_S = 0.3  # recorded before and after, so that the clocks are known on both sides
 _PIECE_S = 0.25
@@ -84,11 +85,19 @@ class Recording:
         self._uno.halt()
         if kind is None and are_asked(self._instruments):
             self._instruments.save()
-            until_ready(self._instruments, lambda: self._uno.samples(_PIECE_S))
+            until_ready(self._instruments, self._listen)
         self.record = self._instruments.stop()
-        self._uno.stream(False)
-        if kind is None:
-            self._line_up()
+        if kind is not None:
+            return self._uno.stream(False)
+        with suppress(*GONE):  # as in `_listen`
+            self._uno.stream(False)
+        self._line_up()
+
+    def _listen(self) -> None:
+        try:
+            self._uno.samples(_PIECE_S)
+        except GONE:  # the recording does not depend on the link any more; the next command reports it
+            self._clock.sleep(_PIECE_S)
 
     def wait(self, duration_s: float, report: bool = True, doing: str = "") -> None:
         """Let `duration_s` pass and keep the Uno's samples. `report`: whether to report the elapsed share as progress;

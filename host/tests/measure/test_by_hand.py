@@ -14,7 +14,7 @@ from bifa.measure.desk import Desk
 from bifa.measure.plan import BRISK
 from bifa.measure.session import run_session
 from bifa.rig import open_rig
-from harness.lab import PLAN, PULL, STATIC, Lab
+from harness.lab import PLAN, PULL, STATIC, WALK, Lab
 
 pytestmark = pytest.mark.uno
 
@@ -265,3 +265,23 @@ def test_a_trial_is_kept_whose_review_is_answered_after_the_port_is_gone(bench, 
         here.run(tmp_path / "day", (STATIC, PULL))
     (kept,) = read_dataset(tmp_path / "day.partial").trials
     assert kept.experiment == "static_loading"
+
+
+@pytest.mark.parametrize("planned", [STATIC, WALK])
+def test_a_trial_is_kept_whose_record_is_saved_after_the_port_is_gone(planned, bench, tmp_path):
+    here = bench()
+    save, gone_s = here.lab.save, []
+
+    def unplug(asked):
+        if not gone_s:
+            gone_s.append(here.rig.clock.now())
+            gone = Mock(side_effect=PortGoneError("/dev/robot is gone"))
+            here.rig.transport.read = here.rig.transport.write = gone
+        return save(asked) if here.rig.clock.now() > gone_s[0] + 1.0 else None
+
+    here.lab.save = unplug
+    with pytest.raises(PortGoneError):
+        here.run(tmp_path / "day", (planned, PULL))
+    (kept,) = read_dataset(tmp_path / "day.partial").trials
+    assert kept.experiment == planned.experiment
+    assert kept.extra["set_point_psi"] == pytest.approx(planned.pressure_psi or 8.47, abs=0.02)
