@@ -19,9 +19,9 @@ from bifa.measure.desk import Desk, NobodyError
 from bifa.measure.experiments import Progress, record_trial
 from bifa.measure.own_instruments import OwnInstruments
 from bifa.measure.plan import Turn
-from bifa.measure.recording import Bench, idle
+from bifa.measure.recording import Bench, idle, unlinked
 from bifa.measure.text_plot import text_plot
-from bifa.rig import GONE, Rig
+from bifa.rig import Rig
 
 _REPEAT = ("r", "repeat")
 _LOOK_S = 0.25
@@ -94,10 +94,8 @@ class ByHand:
         self._desk.ask("review", f"{seen} {choice}, q discards it and stops.", about)
         while True:
             while (answer := self._desk.answer()) is None:
-                try:
+                with unlinked(bench.clock, _LOOK_S):
                     idle(bench, uno, _LOOK_S)
-                except GONE:  # what was recorded does not depend on the link any more; the next command reports it
-                    bench.clock.sleep(_LOOK_S)
             if not answer or answer.lower() in _REPEAT:
                 return not answer
             self._desk.again(answer, choice)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,6 +57,16 @@ def idle(bench: Bench, uno: Uno, duration_s: float, doing: str = "") -> None:
         uno.keep_alive()
 
 
+@contextmanager
+def unlinked(clock: Clock, instead_s: float = 0.0) -> Iterator[None]:
+    """Bear the loss of the link, and let `instead_s` pass: what has been recorded does not depend on it any more, and
+    the next command reports it."""
+    try:
+        yield
+    except GONE:
+        clock.sleep(instead_s)
+
+
 class Recording:
     """A context manager: the instrument and the Uno's stream run inside it; afterwards the valves are off. The Uno
     marks its strobe at the beginning, so that both sides number the samples alike.
@@ -89,15 +99,13 @@ class Recording:
         self.record = self._instruments.stop()
         if kind is not None:
             return self._uno.stream(False)
-        with suppress(*GONE):  # as in `_listen`
+        with unlinked(self._clock):
             self._uno.stream(False)
         self._line_up()
 
     def _listen(self) -> None:
-        try:
+        with unlinked(self._clock, _PIECE_S):
             self._uno.samples(_PIECE_S)
-        except GONE:  # the recording does not depend on the link any more; the next command reports it
-            self._clock.sleep(_PIECE_S)
 
     def wait(self, duration_s: float, report: bool = True, doing: str = "") -> None:
         """Let `duration_s` pass and keep the Uno's samples. `report`: whether to report the elapsed share as progress;
