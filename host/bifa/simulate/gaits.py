@@ -18,8 +18,7 @@ from bifa.simulate.plant import Plant, plant
 from bifa.simulate.timeline import gait_switches
 
 FAST_TOLERANCE_M = 1e-5
-_PIECES_PER_WORKER = 2
-_LANES_FULL = 2  # least number of walks per lane in a piece: at its end, lanes are idle
+_MANY = 4  # walks per lane of all workers from which each worker gets two pieces: pieces differ in cost
 
 
 @dataclass(frozen=True)
@@ -74,8 +73,8 @@ def speeds(
     flats = [plant(model)] * n if isinstance(model, (Model, Plant)) else [plant(one) for one in model]
     count = workers or cores()
     width = lanes.width(single)
-    full = _LANES_FULL * width if width > 1 else 1  # with fewer walks in a call, lanes are idle
-    pieces = max(1, min(_PIECES_PER_WORKER * count, -(-n // full))) if executor or count > 1 else 1
+    most = count * (2 if n >= _MANY * count * width else 1)
+    pieces = max(1, min(most, -(-n // width))) if executor or count > 1 else 1
     shares = [slice(first, None, pieces) for first in range(min(pieces, n))]
     if executor is None and len(shares) > 1:
         executor = _pool(count)
