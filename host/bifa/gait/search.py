@@ -8,8 +8,8 @@ import numpy as np
 from bifa.errors import BifaError
 from bifa.gait.families import FAMILIES, PERIODS
 from bifa.gait.methods import METHODS, Evaluated
-from bifa.gait.methods.cma_es import BASIN_SPACING, POPULATION, basins, climb_basins, climb_together
-from bifa.gait.methods.common import Objective, OnEvaluated, RecordedObjective
+from bifa.gait.methods.cma_es import BASIN_SPACING, POPULATION, TRIAL_GENERATIONS, basins, climb_basins, climb_together
+from bifa.gait.methods.common import Ends, Objective, OnEvaluated, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
 from bifa.gait.pool import Simulations
@@ -39,7 +39,8 @@ class RobustRound:
     draws: robots that each gait is evaluated on. quantile: of the speed, maximised. abandon: share of the best value
     below which a gait is abandoned. tolerance_m: of the integrator, per step. periods: relative changes of the period
     that the previous round's gaits are tried with. evaluations, step, climbs: budget, initial step and number of the
-    CMA-ES runs. jitter: relative variation of the period from robot to robot.
+    CMA-ES runs; trial: generations after which those below `abandon` of the best are abandoned. jitter: relative
+    variation of the period from robot to robot.
     """
 
     draws: int
@@ -50,6 +51,7 @@ class RobustRound:
     evaluations: int = 0
     step: float = 0.0
     climbs: int = 1
+    trial: int = TRIAL_GENERATIONS
     jitter: float = 0.0
 
 
@@ -58,11 +60,12 @@ class RobustRound:
 EXPLORE = RobustRound(24, 0.08, 0.95, 1e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1400, 0.06, jitter=0.005)
 # At the cliff tiny changes of the period decide. Few robots favour periods that are too short, and so do integration
 # errors: with one gait 99 % of the robots walked at steps of 30 um, 65 % at 10 um, 34 % at 3 um, 27 % at 1 um and less.
-_REFINE = RobustRound(128, 0.0677, 0.993, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 288, 0.006, 3, jitter=0.002)
+_REFINE = RobustRound(128, 0.0677, 0.993, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 216, 0.006, 3, 3, jitter=0.002)
 # Changes, in s, of a gait's times that are tried between climbs: a climb ends at the first of many local optima.
 _LONGER_S: dict[str, tuple[float, ...]] = {name: (-0.1, -0.04, 0.04, 0.1) for name in TIMES}
 _LONGER_S |= {"body_vacuum": (-0.12, -0.06, -0.03, 0.03, 0.06), "body_pressure": (-0.02, 0.02, 0.05, 0.1)}
-_SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004))
+# The last few thousandths: finalists differ less than 128 robots can tell.
+_FINISH = RobustRound(256, 0.08, 0.997, 3e-6, (0.0, 0.004, -0.004), 48, 0.002, jitter=0.001)
 # Finalists are checked by the full metric: the quick one is lenient, and a gait that is best on some robots may fail
 # on others. Copies slower by these fractions follow.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
@@ -333,8 +336,20 @@ def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]
     begun = best.near_best(_MIN_END_RATIO).finalists(_REFINE.climbs, BASIN_SPACING, wraps)
     if not len(begun):
         return []
-    climb_together(recorder, begun, budget, settings.seed, [_REFINE.step] * len(begun), _REFINE.abandon)
-    return [recorder.found()]
+    return [recorder.found(_climb_on(search, _REFINE, recorder, begun, explored))]
+
+
+def _climb_on(
+    search: SearchRun, stage: RobustRound, recorder: RecordedObjective, begun: np.ndarray, before: Evaluated
+) -> Ends:
+    """Run CMA-ES from points `begun` (n, dimensions) with the covariances that the runs of the round `before` adapted
+    nearby: a ridge along the cliff has nearly the same direction on other robots, and a short run cannot learn it."""
+    wraps, settings = search.settings.space.wraps, search.settings
+    budget, steps = _scaled_budget(stage.evaluations, settings), [stage.step] * len(begun)
+    shapes = None if before.ends is None else before.ends.shapes_near(begun, wraps)
+    return climb_together(
+        recorder, begun, budget, settings.seed, steps, stage.abandon, trial=stage.trial, shapes=shapes
+    )
 
 
 def _fastest_finalist(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:
@@ -357,22 +372,26 @@ def _fastest_finalist(search: SearchRun, explored: Evaluated) -> tuple[Gait, flo
 
 
 def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated) -> tuple[Gait, float]:
-    """Return the first finalist that keeps `_ACCEPT_RATIO` of the best value on robots the search did not use, and its
-    speed. Slower copies of the best one follow, in case all finalists are beyond the cliff. If none keeps that much,
-    the best of those that keep `_WALK_RATIO` is taken, and failing that, the one with the highest mean speed."""
+    """Climb from the best finalist of `refined` on robots of a last round, and return the first finalist of this round
+    that keeps `_ACCEPT_RATIO` of the best value on robots the search did not use, and its speed. Slower copies of the
+    best one follow, in case all finalists are beyond the cliff. If none keeps that much, the best of those that keep
+    `_WALK_RATIO` is taken, and failing that, the one with the highest mean speed."""
     settings, space = search.settings, search.settings.space
     finalists = refined.finalists(_ROBUST_FINALISTS, apart=_MIN_SPACING)
-    objective = search.objective(_SHORTLIST, 2)
-    shortlist = np.concatenate(_at_periods(space, finalists, _SHORTLIST.periods))
+    copies = np.concatenate(_at_periods(space, finalists, _FINISH.periods))
+    budget = len(copies) + _scaled_budget(_FINISH.evaluations, settings)
+    recorder = RecordedObjective(search.objective(_FINISH, 2), space.wraps, search.progress_callback("finish", budget))
     # One call each: gaits worse than the best so far are evaluated on few robots only, the hardest first.
-    values = np.concatenate([objective(point[None]) for point in shortlist])
-    search.on_progress("verify", 0.6, float(values.max()))
-    ranked = shortlist[np.argsort(-values, kind="stable")]
-    best = ranked[:_ROBUST_FINALISTS]
+    for point in copies:
+        recorder(point[None])
+    if settings.refine and recorder.best > 0.0:
+        _climb_on(search, _FINISH, recorder, recorder.found().best_point[None], refined)
+    best, promised = recorder.found().finalists(_ROBUST_FINALISTS, apart=_MIN_SPACING), recorder.best
+    search.on_progress("verify", 0.6, promised)
     checking = search.robots(_CHECKING_DRAWS, settings.seed + 2_500_000)
     metric = replace(settings.metric, tolerance_m=FINE_M)
-    # Relative to the best value of the shortlist, not to the gait's speed on the model, where it may have failed too.
-    least = max(_WALK_RATIO * float(values.max()), STANDING_MM_S)
+    # Relative to the best value of the last round, not to the gait's speed on the model, where it may have failed too.
+    least = max(_WALK_RATIO * promised, STANDING_MM_S)
     near = np.concatenate([best, *(space.slower(best[:1], share) for share in _SLOWER)])
     # Finalists from elsewhere, used only if none of the above walks at all by the full metric.
     far = explored.finalists(_NOMINAL_FINALISTS, apart=_WIDE_SPACING)
@@ -385,7 +404,7 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
             speeds = distribution(search.runs, checking, row[None], metric)[0]
             low = float(np.quantile(speeds, _CHECK_QUANTILE * settings.share / QUANTILE))
             stands = low > least
-            if stands and low >= _ACCEPT_RATIO * values.max():
+            if stands and low >= _ACCEPT_RATIO * promised:
                 return Gait(*row.tolist()), float(speed)
             if (worth := (stands, low if stands else float(speeds.mean()))) > most:
                 otherwise, most = (Gait(*row.tolist()), float(speed)), worth

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bifa.gait.methods import METHODS
-from bifa.gait.methods.cma_es import climb_basins
-from bifa.gait.methods.common import Evaluated, RecordedObjective
+from bifa.gait.methods.cma_es import climb_basins, climb_together
+from bifa.gait.methods.common import Ends, Evaluated, RecordedObjective
 
 WRAPS = np.array([False, True, True, False, False])
 TOP = np.array([0.31, 0.98, 0.07, 0.5, 0.6])
@@ -76,7 +76,7 @@ def test_runs_that_end_apart_are_not_taken_for_an_answer():
     np.testing.assert_array_equal(peaks(found.ends.points), found.ends.values)
     assert found.agrees == (found.ends.values[1] >= 0.99 * found.ends.values[0])
     for second, agrees in ((10.0, False), (18.71, True)):
-        ends = Evaluated(found.points[:2], np.array([18.79, second]))
+        ends = Ends(found.points[:2], np.array([18.79, second]), found.ends.shapes[:2])
         assert Evaluated(found.points, found.values, ends).agrees == agrees
 
 
@@ -105,6 +105,48 @@ def test_a_narrow_basin_is_climbed_from_a_point_known_to_be_near_its_top():
         values.append(climb_basins(recorder, np.zeros(5, bool), 1500, 0, known=known).best_value)
     assert values[0] == pytest.approx(0.9, abs=0.01)
     assert values[1] > 0.99
+
+
+RIDGE = np.linalg.qr(np.random.default_rng(2).standard_normal((5, 5)))[0]
+LENGTHS = np.array([0.3, 0.1, 0.03, 0.01, 0.003])
+
+
+def ridge(top):
+    """A hill that is a hundred times longer in one direction than in another, none of them along an axis."""
+    return lambda points: 1 / np.sqrt(1 + (((points - top) @ RIDGE / LENGTHS) ** 2).sum(axis=1))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_short_climb_on_other_robots_goes_on_with_the_shape_that_a_longer_one_has_learnt(seed):
+    """Without it, the last round of a robust search spends its evaluations learning which way the cliff runs."""
+    flat = np.zeros(5, bool)
+    first = climb_together(RecordedObjective(ridge(np.full(5, 0.5)), flat), np.full((1, 5), 0.55), 1500, seed, [0.05])
+    shape = first.shapes[0] @ first.shapes[0].T
+    np.testing.assert_allclose(np.linalg.det(first.shapes), 1.0)
+    widths = np.sqrt(np.diag(RIDGE.T @ shape @ RIDGE))
+    assert widths[0] / widths[-1] > 10.0, "it is longer along the ridge"
+    other, start = ridge(np.full(5, 0.5) + 0.3 * LENGTHS[0] * RIDGE[:, 0]), first.points
+    ends = [
+        climb_together(RecordedObjective(other, flat), start, 240, seed, [0.02], shapes=shapes).values[0]
+        for shapes in (None, first.shapes_near(start, flat))
+    ]
+    assert 1.0 - ends[1] < 0.25 * (1.0 - ends[0])
+
+
+def test_a_run_behind_is_abandoned_after_its_trial():
+    recorder = RecordedObjective(two_basins, np.zeros(5, bool))
+    ends = climb_together(recorder, np.array([[0.7] * 5, [0.3] * 5]), 600, 0, [0.02, 0.02], trial=3)
+    assert ends.values[0] > 0.99
+    other = np.abs(recorder.found().points - 0.3).max(axis=1) < 0.25
+    assert np.count_nonzero(other) == 3 * 12
+
+
+def test_the_shape_is_that_of_the_nearest_run_also_the_other_way_round():
+    ends = Ends(np.array([[0.98, 0.5], [0.4, 0.5]]), np.array([2.0, 1.0]), np.array([np.eye(2), 3.0 * np.eye(2)]))
+    near = np.array([[0.05, 0.5], [0.5, 0.4]])
+    for wraps, first in ((True, 1.0), (False, 3.0)):
+        np.testing.assert_array_equal(ends.shapes_near(near, np.array([wraps, False]))[:, 0, 0], [first, 3.0])
+    assert ends.joined(Ends(near[:1], np.array([1.5]), np.eye(2)[None])).values.tolist() == [2.0, 1.5, 1.0]
 
 
 @pytest.mark.parametrize("method", ["de", "cma", "bo"])

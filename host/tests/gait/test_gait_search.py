@@ -8,6 +8,7 @@ import pytest
 from bifa.cluster import ClusterError
 from bifa.gait import Metric, SearchError, Settings, library, optimize, simulations
 from bifa.gait.methods import METHODS, Evaluated
+from bifa.gait.methods.common import Ends
 from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution
 from bifa.gait.search import EXPLORE, VERIFYING_DRAWS, SearchRun, best_of_finalists, explore_on_robots
 from bifa.gait.uncertainty import spread_of
@@ -21,7 +22,7 @@ SPACE = Settings().space
 def verified(model, runs, points, spread, values=None):
     """The verified finalist among these points, and its speed."""
     found = Evaluated(points, np.ones(len(points)) if values is None else values)
-    return best_of_finalists(SearchRun(model, runs, spread_of(model, spread), Settings()), found, found)
+    return best_of_finalists(SearchRun(model, runs, spread_of(model, spread), Settings(refine=False)), found, found)
 
 
 def test_the_baseline_has_the_papers_speed(runs, nominal_plant):
@@ -202,7 +203,7 @@ def test_a_search_whose_runs_do_not_agree_says_so(runs):
     explored = optimum.explored
 
     def ended(*values):
-        ends = Evaluated(explored.points[: len(values)], np.array(values))
+        ends = Ends(explored.points[: len(values)], np.array(values), np.tile(np.eye(5), (len(values), 1, 1)))
         return replace(optimum, explored=replace(explored, ends=ends))
 
     apart = ended(18.71, 10.0, 9.5)

@@ -9,7 +9,7 @@ from scipy.stats import qmc
 
 from bifa.gait.space import folded
 
-from .common import Evaluated, Objective, OnEvaluated, RecordedObjective, agree
+from .common import Ends, Evaluated, Objective, OnEvaluated, RecordedObjective, agree
 
 _SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, doubled until enough walk
 _MIN_WALKING = 60
@@ -18,7 +18,7 @@ _NEIGHBORS, _COMPARED = 8, 2000
 POPULATION = 12  # points per run and generation
 _CLIMBS = 5  # runs side by side, at first and in each restart
 _STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations in the unit cube: in any basin, and near its top
-_TRIAL_GENERATIONS = 10  # generations after which a run far behind the best is abandoned
+TRIAL_GENERATIONS = 10  # generations after which a run far behind the best is abandoned
 _ABANDON_RATIO = 0.9  # share of the best value below which a run is far behind
 _REL_TOL = 2.5e-3  # relative difference within which the best two runs agree
 _STALL_GENERATIONS, _MIN_GAIN = 10, 5e-4  # a run ends if it gains less than this fraction in so many generations
@@ -51,8 +51,8 @@ def climb_basins(
     agree, all basins were tried, or about `evaluations` are recorded. With `known` points every run is completed: two
     that agree early may be in one basin, and another may overtake both."""
     same = 0.0 if len(known) else _REL_TOL
-    ends, tried = Evaluated(np.empty((0, len(wraps))), np.empty(0)), list(known)
-    while recorder.count < evaluations and not agree(ends.values, _REL_TOL):
+    ends, tried = None, list(known)
+    while recorder.count < evaluations and not (ends and agree(ends.values, _REL_TOL)):
         others = basins(recorder.found(), wraps, _CLIMBS - len(known), tried)
         starts = np.array([*known, *others])
         if not len(starts):
@@ -60,8 +60,8 @@ def climb_basins(
         steps = [_NEAR_TOP] * len(known) + [step] * len(others)
         budget, run_seed = evaluations - recorder.count, seed + len(tried)
         more = climb_together(recorder, starts, budget, run_seed, steps, behind, same)
-        ends, tried, known = ends.joined(more), [*tried, *others], ()
-    return recorder.found(ends.ranked if len(ends.values) else None)
+        ends, tried, known = ends.joined(more) if ends else more, [*tried, *others], ()
+    return recorder.found(ends)
 
 
 def _sample(recorder: RecordedObjective, dimensions: int, seed: int, evaluations: int) -> None:
@@ -104,39 +104,47 @@ def climb_together(
     steps: Sequence[float],
     behind: float = _ABANDON_RATIO,
     same: float = 0.0,
-) -> Evaluated:
+    trial: int = TRIAL_GENERATIONS,
+    shapes: np.ndarray | None = None,
+) -> Ends:
     """Run CMA-ES from `starts` (n, dimensions), one generation of all runs per call; return the best point of each.
-    A run that after `_TRIAL_GENERATIONS` is below `behind` of the best is abandoned. If `same` is not 0, all runs stop
-    once two that have ended agree within it and no running one is ahead."""
+    A run that after `trial` generations is below `behind` of the best is abandoned. If `same` is not 0, all runs stop
+    once two that have ended agree within it and no running one is ahead. shapes: of the initial distributions, as in
+    `Ends`; None: round."""
     tops = np.array(starts, dtype=float)
-    runs = [_strategy(*start, seed + k) for k, start in enumerate(zip(starts, steps, strict=True))]
+    shapes = np.tile(np.eye(tops.shape[1]), (len(tops), 1, 1)) if shapes is None else shapes
+    # Each run has coordinates of its own, in which its initial distribution is round.
+    own = [np.linalg.solve(shape, start) for shape, start in zip(shapes, tops, strict=True)]
+    runs = [_strategy(*start, seed + k) for k, start in enumerate(zip(own, steps, strict=True))]
     bests: list[list[float]] = [[] for _ in runs]  # best value so far of each run, after every generation
     alive, spent = list(range(len(runs))), 0
     while alive and spent < evaluations:
-        asked = [np.array(runs[k].ask()) for k in alive]
-        values = np.split(recorder(np.concatenate(asked)), np.cumsum([len(a) for a in asked])[:-1])
-        for k, points, value in zip(alive, asked, values, strict=True):
-            runs[k].tell(list(points), (-value).tolist())
+        asked = [runs[k].ask() for k in alive]
+        tried = [np.array(one) @ shapes[k].T for k, one in zip(alive, asked, strict=True)]
+        values = np.split(recorder(np.concatenate(tried)), np.cumsum([len(one) for one in tried])[:-1])
+        for k, one, points, value in zip(alive, asked, tried, values, strict=True):
+            runs[k].tell(one, (-value).tolist())
             if not bests[k] or value.max() > bests[k][-1]:
                 tops[k] = folded(points[int(np.argmax(value))], recorder.wraps)
             bests[k].append(max([*bests[k][-1:], float(value.max())]))
-        spent += sum(map(len, asked))
+        spent += sum(map(len, tried))
         best = max(one[-1] for one in bests)
-        alive = [
-            k for k in alive if not (runs[k].stop() or _is_hopeless(bests[k], behind * best) or _has_stalled(bests[k]))
-        ]
+        behind_others = {k for k in alive if len(bests[k]) >= trial and bests[k][-1] < behind * best}
+        alive = [k for k in alive if not (k in behind_others or runs[k].stop() or _has_stalled(bests[k]))]
         ended = sorted(one[-1] for k, one in enumerate(bests) if k not in alive)
         if same and len(ended) > 1 and agree([best, ended[-2]], same):
             break
-    return Evaluated(tops, np.array([one[-1] if one else 0.0 for one in bests]))
-
-
-def _is_hopeless(bests: Sequence[float], least: float) -> bool:
-    return len(bests) >= _TRIAL_GENERATIONS and bests[-1] < least
+    ends = np.array([one[-1] if one else 0.0 for one in bests])
+    return Ends(tops, ends, np.array([shape @ _shape(run) for shape, run in zip(shapes, runs, strict=True)])).ranked
 
 
 def _has_stalled(bests: Sequence[float]) -> bool:
     return len(bests) > _STALL_GENERATIONS and bests[-1] - bests[-1 - _STALL_GENERATIONS] <= _MIN_GAIN * abs(bests[-1])
+
+
+def _shape(run: cma.CMAEvolutionStrategy) -> np.ndarray:
+    root = np.linalg.cholesky(run.sm.covariance_matrix)
+    return root / np.linalg.det(root) ** (1.0 / len(root))
 
 
 def _strategy(start: np.ndarray, step: float, seed: int) -> cma.CMAEvolutionStrategy:

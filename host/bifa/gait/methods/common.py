@@ -16,6 +16,34 @@ AGREE = 0.01  # relative difference within which the best two of independent run
 
 
 @dataclass(frozen=True)
+class Ends:
+    """End points of independent runs: `points` (n, dimensions) and `values` (n,).
+
+    shapes: (n, dimensions, dimensions) the adapted covariance of each run, as a matrix S with S S^T proportional to it
+    and determinant 1.
+    """
+
+    points: np.ndarray
+    values: np.ndarray
+    shapes: np.ndarray
+
+    @property
+    def ranked(self) -> "Ends":
+        """The same end points, the best first."""
+        order = np.argsort(-self.values, kind="stable")
+        return Ends(self.points[order], self.values[order], self.shapes[order])
+
+    def joined(self, other: "Ends") -> "Ends":
+        """Return the end points of both, the best first."""
+        parts = ((getattr(self, name), getattr(other, name)) for name in ("points", "values", "shapes"))
+        return Ends(*map(np.concatenate, parts)).ranked
+
+    def shapes_near(self, points: np.ndarray, wraps: np.ndarray) -> np.ndarray:
+        """Shapes of the end points nearest to `points` (m, dimensions), (m, dimensions, dimensions)."""
+        return self.shapes[[int(np.argmin(_distances(self.points, point, wraps))) for point in points]]
+
+
+@dataclass(frozen=True)
 class Evaluated:
     """Everything that was evaluated: `points` (n, dimensions), folded into the cube, and `values` (n,).
 
@@ -24,7 +52,7 @@ class Evaluated:
 
     points: np.ndarray
     values: np.ndarray
-    ends: "Evaluated | None" = None
+    ends: Ends | None = None
 
     @property
     def agrees(self) -> bool:
@@ -46,12 +74,6 @@ class Evaluated:
         parts = (self, *others)
         points, values = (np.concatenate([getattr(part, name) for part in parts]) for name in ("points", "values"))
         return Evaluated(points, values, self.ends)
-
-    @property
-    def ranked(self) -> "Evaluated":
-        """The same evaluations, the best first."""
-        order = np.argsort(-self.values, kind="stable")
-        return Evaluated(self.points[order], self.values[order], self.ends)
 
     def near_best(self, share: float) -> "Evaluated":
         """Return the evaluations that reach `share` of the best value; none if that is 0."""
@@ -115,6 +137,6 @@ class RecordedObjective:
             self._on_progress(self.count, self.best)
         return values
 
-    def found(self, ends: Evaluated | None = None) -> Evaluated:
+    def found(self, ends: Ends | None = None) -> Evaluated:
         """Return everything recorded; `ends`: end points of independent runs."""
         return Evaluated(np.concatenate(self._points), np.concatenate(self._values), ends)
