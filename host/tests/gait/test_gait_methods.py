@@ -91,6 +91,23 @@ def test_climbs_begin_at_the_basins_that_were_seen():
     assert len(found.values) < 600 + 5 * 12, "at most one more generation of five runs"
 
 
+@pytest.mark.parametrize("by_batch", [False, True])
+def test_runs_of_one_batch_that_agree_do_not_end_a_search_for_the_fastest(by_batch):
+    """They begin with the best that was seen, often in one basin: with a lagging sensor three of five searches missed
+    the family of gaits that is 0.6 % faster."""
+    tops, heights = np.vstack([0.2 + 0.5 * np.eye(5), np.full(5, 0.8)]), np.array([*5 * [0.9], 1.0])
+
+    def peaks(points):
+        away = np.abs(points[:, None] - tops).max(axis=2)
+        return (heights * np.maximum(1 - away / 0.1, 0)).max(axis=1)
+
+    flat = np.zeros(5, bool)
+    recorder = RecordedObjective(peaks, flat)
+    recorder(tops + np.array([*5 * [0.02], 0.06])[:, None])
+    found = climb_basins(recorder, flat, 4000, 0, by_batch=by_batch)
+    assert found.best_value == pytest.approx(1.0 if by_batch else 0.9, abs=0.01)
+
+
 def test_a_narrow_basin_is_climbed_from_a_point_known_to_be_near_its_top():
     """Without known points, a family of gaits 5 % faster on some robots was found with one seed in four only."""
 

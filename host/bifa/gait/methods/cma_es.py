@@ -1,4 +1,4 @@
-"""CMA-ES (Hansen; package `cma`) from several basins of a space-filling sample, until the best two runs agree."""
+"""CMA-ES (Hansen; package `cma`) from several basins of a space-filling sample, until restarts agree."""
 
 from collections.abc import Sequence
 
@@ -35,7 +35,7 @@ def cma_es(
     (dimensions,) marks axes that are full turns."""
     recorder = RecordedObjective(objective, wraps, on_progress)
     _sample(recorder, len(wraps), seed, evaluations)
-    return climb_basins(recorder, wraps, evaluations, seed)
+    return climb_basins(recorder, wraps, evaluations, seed, by_batch=True)
 
 
 def climb_basins(
@@ -46,13 +46,16 @@ def climb_basins(
     step: float = _STEP,
     known: Sequence[np.ndarray] = (),
     behind: float = _ABANDON_RATIO,
+    by_batch: bool = False,
 ) -> Evaluated:
-    """Run CMA-ES from points `known` to be near local optima and from the best recorded basins, until the best two runs
-    agree, all basins were tried, or about `evaluations` are recorded. With `known` points every run is completed: two
-    that agree early may be in one basin, and another may overtake both."""
+    """Run CMA-ES from points `known` to be near local optima and from the best recorded basins, several runs at a time,
+    until the best two agree, all basins were tried, or about `evaluations` are recorded. With `known` points every run
+    is completed: two that agree early may be in one basin, and another may overtake both. by_batch: the best of those
+    that ran side by side have to agree with those of other batches; within one, two often end in the same local
+    optimum."""
     same = 0.0 if len(known) else _REL_TOL
-    ends, tried = None, list(known)
-    while recorder.count < evaluations and not (ends and agree(ends.values, _REL_TOL)):
+    ends, tried, compared = None, list(known), np.empty(0)
+    while recorder.count < evaluations and not agree(compared, _REL_TOL):
         others = basins(recorder.found(), wraps, _CLIMBS - len(known), tried)
         starts = np.array([*known, *others])
         if not len(starts):
@@ -60,6 +63,7 @@ def climb_basins(
         steps = [_NEAR_TOP] * len(known) + [step] * len(others)
         budget, run_seed = evaluations - recorder.count, seed + len(tried)
         more = climb_together(recorder, starts, budget, run_seed, steps, behind, same)
+        compared = np.append(compared, more.values[: 1 if by_batch else None])
         ends, tried, known = ends.joined(more) if ends else more, [*tried, *others], ()
     return recorder.found(ends)
 
