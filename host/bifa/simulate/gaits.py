@@ -18,7 +18,6 @@ from bifa.simulate.plant import Plant, plant
 from bifa.simulate.timeline import gait_switches
 
 FAST_TOLERANCE_M = 1e-5
-_MANY = 4  # walks per lane of all workers from which each worker gets two pieces: pieces differ in cost
 
 
 @dataclass(frozen=True)
@@ -73,8 +72,7 @@ def speeds(
     flats = [plant(model)] * n if isinstance(model, (Model, Plant)) else [plant(one) for one in model]
     count = workers or cores()
     width = lanes.width(single)
-    most = count * (2 if n >= _MANY * count * width else 1)
-    pieces = max(1, min(most, -(-n // width))) if executor or count > 1 else 1
+    pieces = max(1, min(count, -(-n // width)))
     shares = [slice(first, None, pieces) for first in range(min(pieces, n))]
     if executor is None and len(shares) > 1:
         executor = _pool(count)
@@ -100,7 +98,9 @@ def _progress(
     gaits: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Advance and slip in each cycle, each of shape (n, cycles)."""
-    ways = [rigs.pipe(flat, inclination_deg, terrain, looser=looser) for flat in flats]
+    robots = {id(flat): flat for flat in flats}
+    mounted = {key: rigs.pipe(flat, inclination_deg, terrain, looser=looser) for key, flat in robots.items()}
+    ways = [mounted[id(flat)] for flat in flats]
     ends = gaits[:, :1] * np.arange(1, cycles + 1)
     switches = gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)
     what = lanes.Experiment(lanes.PROGRESS, ways, switches, list(ends), tolerance_m, settled=settled, single=single)
