@@ -93,8 +93,8 @@ def test_climbs_begin_at_the_basins_that_were_seen():
 
 @pytest.mark.parametrize("by_batch", [False, True])
 def test_runs_of_one_batch_that_agree_do_not_end_a_search_for_the_fastest(by_batch):
-    """They begin with the best that was seen, often in one basin: with a lagging sensor three of five searches missed
-    the family of gaits that is 0.6 % faster."""
+    """They begin with the best that was seen, often in one basin: with a misplaced sensor four of five searches
+    missed the family of gaits that is 0.6 % faster."""
     tops, heights = np.vstack([0.2 + 0.5 * np.eye(5), np.full(5, 0.8)]), np.array([*5 * [0.9], 1.0])
 
     def peaks(points):

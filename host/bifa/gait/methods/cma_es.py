@@ -138,8 +138,9 @@ def climb_together(
         ended = sorted(one[-1] for k, one in enumerate(bests) if k not in alive)
         if same and len(ended) > 1 and agree([best, ended[-2]], same):
             break
-    ends = np.array([one[-1] if one else 0.0 for one in bests])
-    return Ends(tops, ends, np.array([shape @ _shape(run) for shape, run in zip(shapes, runs, strict=True)])).ranked
+    reached = np.array([one[-1] if one else 0.0 for one in bests])
+    adapted = np.array([shape @ _shape(run) for shape, run in zip(shapes, runs, strict=True)])
+    return Ends(tops, reached, adapted).ranked
 
 
 def _has_stalled(bests: Sequence[float]) -> bool:
