@@ -66,17 +66,6 @@ class SearchSpace:
         slow[:, number] += share * (axis.lower / (axis.upper - axis.lower) + points[:, number])
         return folded(slow, self.wraps)
 
-    def point(self, gait: Gait) -> np.ndarray:
-        """Convert a gait to a point (dimensions,). Raises SpaceError if it is outside or values of one axis differ."""
-        values = gait.as_dict()
-        for axis in self.axes:
-            first, *others = (values[name] for name in axis.sets)
-            if any(abs(other - first) > 1e-9 for other in others):
-                raise SpaceError(f"{axis.name}: {' and '.join(axis.sets)} are searched as one axis and must be equal")
-            if not axis.lower <= first <= axis.upper:
-                raise SpaceError(f"{axis.name} = {first:g} is outside {axis.lower:g} to {axis.upper:g} {axis.unit}")
-        return self._unfolded(gait_rows([gait]))[0]
-
     def nearest(self, gaits: Sequence[Gait]) -> np.ndarray:
         """Convert gaits to the nearest points of the space, (n, dimensions)."""
         return folded(self._unfolded(gait_rows(gaits)), self.wraps)

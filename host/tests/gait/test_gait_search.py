@@ -47,7 +47,7 @@ def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nomin
     near = np.array([[*ROBUST.as_dict().values()]]) * (
         1 + 0.01 * np.random.default_rng(0).normal(size=(8, 5))[:, [0, 1, 2, 3, 4, 4]]
     )
-    points = np.array([SPACE.point(Gait(*row)) for row in near.tolist()])
+    points = SPACE.nearest([Gait(*row) for row in near.tolist()])
     objective = RobustSpeed(runs, nominal_plant, draws, SPACE, metric, share=0.05)
     robust = objective(points)
     rows = gait_rows(SPACE.gaits(points))
@@ -67,7 +67,7 @@ def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nomin
 def test_a_gait_that_walks_by_a_hair_of_its_period_does_not_count_where_periods_jitter(runs, nominal_plant):
     among = (runs, nominal_plant, [nominal_plant] * 16, SPACE, Metric().quicker())
     exact, jittered = (RobustSpeed(*among, jitter=jitter) for jitter in (0.0, 0.005))
-    point = SPACE.point(library.load("fast").gait)[None]
+    point = SPACE.nearest([library.load("fast").gait])
     copies = np.concatenate([SPACE.slower(point, share) for share in np.arange(0.02, -0.03, -0.001)])
     walks = exact(copies) > 20.0
     last = int(np.argmin(walks)) - 1  # one step of 0.1 % before the first copy that does not walk
@@ -88,7 +88,7 @@ def test_where_the_fastest_gait_falls_the_climb_begins_at_its_slower_copies(runs
     """Most of the fast basin lies beyond the cliff of some robots, where a robust objective is 0 and has no slope: for
     a robot whose valves choke, a search ended at 8.5 mm/s in place of 18."""
     search = SearchRun(nominal(), runs, spread_of(nominal(), 0.02), Settings())
-    fast = SPACE.point(library.load("fast").gait)[None]
+    fast = SPACE.nearest([library.load("fast").gait])
     assert search.objective(EXPLORE, 0)(fast)[0] < 2.0
     found = explore_on_robots(search, Evaluated(fast, np.ones(1)))
     assert found.best_value > 20.0
@@ -122,7 +122,7 @@ def test_a_search_ends_no_slower_than_the_gaits_that_it_begins_from(runs, robust
 def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     """With a spread of 1 %, a search on few robots ended at gaits that fail on one robot in ten: 10th percentile 0."""
     sloping = nominal().with_effects({"inclination": {"angle_deg": 5.0}})
-    brittle = SPACE.slower(SPACE.point(library.load("robust").gait)[None], -0.04)
+    brittle = SPACE.slower(SPACE.nearest([library.load("robust").gait]), -0.04)
     gait, speed = verified(sloping, runs, brittle, 0.01)
     draws = spread_of(sloping, 0.01).plants(sloping, 128, seed=99)
     speeds = distribution(runs, draws, gait_rows([*SPACE.gaits(brittle), gait]), Settings().metric)
@@ -137,10 +137,10 @@ def test_where_all_gaits_of_one_place_fall(runs, monkeypatch, elsewhere, slow):
     """For a viscoelastic robot one seed in four found no gait: all finalists lay beyond the same cliff, where the robot
     creeps at best. With tether drag, one seed in five had no finalist elsewhere either. With a leak, one seed in four
     was content with a slow gait that walked, at 18.2 mm/s where 22.8 had been found."""
-    fallen = SPACE.slower(SPACE.point(library.load("fast").gait)[None], -0.02)
+    fallen = SPACE.slower(SPACE.nearest([library.load("fast").gait]), -0.02)
     near = 0.0035 * np.array([[0.0, row, column, 0.0, 0.0] for row in range(8) for column in range(9)])
     crept = [SPACE.slower(fallen, share) for share in slow]
-    points = np.vstack([fallen + near, *crept, *(SPACE.point(library.load(name).gait) for name in elsewhere)])
+    points = np.vstack([fallen + near, *crept, *SPACE.nearest([library.load(name).gait for name in elsewhere])])
     found = Evaluated(points, np.r_[np.full(len(near), 25.0), np.full(len(slow), 25.1), np.full(len(elsewhere), 22.0)])
     monkeypatch.setitem(METHODS, "cma", lambda *_: found)
     assert optimize(nominal(), runs, Settings(robust=False, refine=False)).nominal_mm_s > 21.0
@@ -149,7 +149,7 @@ def test_where_all_gaits_of_one_place_fall(runs, monkeypatch, elsewhere, slow):
 def test_a_gait_of_which_no_cycle_is_like_the_one_before_counts_where_none_can_be(runs, monkeypatch):
     """With a rippling supply, a search kept to the few multiples of the ripple's period: 18.5 mm/s, not 22.8."""
     rippling = nominal().with_effects({"regulator_ripple": {}})
-    found = Evaluated(SPACE.slower(SPACE.point(library.load("robust").gait)[None], 0.02), np.array([22.0]))
+    found = Evaluated(SPACE.slower(SPACE.nearest([library.load("robust").gait]), 0.02), np.array([22.0]))
     monkeypatch.setitem(METHODS, "cma", lambda *_: found)
     assert optimize(rippling, runs, Settings(robust=False, refine=False)).nominal_mm_s > 20.0
     monkeypatch.setattr(Metric, "of_unlike_cycles", lambda self: self)  # cycles have to agree, whatever the robot
@@ -159,7 +159,7 @@ def test_a_gait_of_which_no_cycle_is_like_the_one_before_counts_where_none_can_b
 
 def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(runs):
     """It is rejected although nearly all robots are as fast as the model with it, which does not walk either."""
-    fallen = SPACE.slower(SPACE.point(library.load("fast").gait)[None], -0.02)
+    fallen = SPACE.slower(SPACE.nearest([library.load("fast").gait]), -0.02)
     assert distribution(runs, [plant(nominal())], gait_rows(SPACE.gaits(fallen)), Metric())[0, 0] < 2.0
     _, speed = verified(nominal(), runs, fallen, 0.001)
     assert speed > 20.0
@@ -167,7 +167,7 @@ def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(
 
 def test_a_finalist_that_keeps_less_than_the_best_promised_gives_way_to_one_that_keeps_it(runs, monkeypatch):
     """With a sagging supply, the 8.5 % quantile of 512 robots just kept the promise, the 10 % one of 1,024 did not."""
-    point = SPACE.point(library.load("robust").gait)
+    point = SPACE.nearest([library.load("robust").gait])[0]
     lucky = np.vstack([point, SPACE.slower(point[None], 0.03)])
     fastest: list[float] = []
 
@@ -185,7 +185,7 @@ def test_a_finalist_that_keeps_less_than_the_best_promised_gives_way_to_one_that
 @pytest.mark.slow
 def test_where_no_gait_suits_nine_robots_in_ten_the_best_is_given(runs):
     """If half the robots of a 20 % spread cannot walk so fast, there is no error and no arbitrary gait."""
-    points = np.array([SPACE.point(library.load(name).gait) for name in ("fast", "robust")])
+    points = SPACE.nearest([library.load(name).gait for name in ("fast", "robust")])
     gait, speed = verified(nominal(), runs, points, 0.2)
     assert speed > 20.0
     assert gait.period_s > points[:, 0].max() * 2.0 + 2.0
