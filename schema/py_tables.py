@@ -34,7 +34,9 @@ def module(parameters: ParameterTable, commands: CommandTable, constants: tuple[
     inward = "\n".join(_message(c.message, set_size) for c in commands.commands if c.message)
     outward = "\n".join(_message(m, set_size) for m in commands.reports)
     results = "\n".join(f"    ({name!r}, {text!r})," for name, text in commands.results)
-    words = "\n".join(f"{_plural(name)} = {tuple(words)!r}" for name, words in commands.words.items())
+    words = "\n".join(
+        f"{_plural(name)} = {tuple(words)!r}" for name, words in commands.words.items() if name != "Chamber"
+    )
     units = "\n".join(f"    {fault!r}: {unit!r}," for fault, unit in commands.fault_units.items())
     typed = "\n".join(f"    ({c.name!r}, {c.usage!r}, {c.help!r})," for c in commands.commands if c.usage)
     return f'''# ruff: noqa

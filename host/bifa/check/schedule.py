@@ -9,8 +9,8 @@ import numpy as np
 from bifa.check.finding import Finding
 from bifa.data import Trial
 from bifa.printable import counted
-from bifa.ranges import RANGES
-from bifa.robot.cpg import CHAMBERS, COUPLING_PER_S
+from bifa.ranges import CHAMBERS, RANGES
+from bifa.robot.cpg import COUPLING_PER_S
 from bifa.simulate import of_samples, recorded_commands
 
 # A record at 100 Hz resolves a phase to 0.2 % of a cycle of 4 s; the Uno's resonator is good to 0.5 %.

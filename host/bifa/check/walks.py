@@ -12,7 +12,7 @@ import numpy as np
 from bifa.check.finding import Finding
 from bifa.check.lag import displacement_lag, length_mm
 from bifa.data import Trial
-from bifa.robot.cpg import CHAMBERS
+from bifa.ranges import CHAMBERS
 
 from .schedule import check_gait, differing_parameters, estimate_gait
 from .signs import MAX_REVERSED_SHARE, PORTS, follow, swing

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
+from bifa.ranges import CHAMBERS
+
 FORMAT = 1
 TABLE_FILE = "dataset.toml"
 RAW = "raw"  # folder in a data set for unchanged copies of the instruments' files
-CHAMBERS = ("body", "head", "tail")
 
 INCLINATION_RANGE_DEG = (-90.0, 90.0)
 PRESSURE_RANGE_PSI = (-15.0, 15.0)  # the sensor's span, Honeywell ABP...015PD: +-15 psi

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bifa.files import read_bytes
-from bifa.ranges import RANGES
+from bifa.ranges import CHAMBERS, RANGES
 from bifa.toml import parse_toml
 
 from .dataset import Dataset, Trial
@@ -18,7 +18,6 @@ from .errors import DatasetError
 from .export import OWN_NAMES, ROLES, Export, parse_exports, read_columns
 from .fields import Fields, Source
 from .layout import (
-    CHAMBERS,
     CHOICES,
     EXPERIMENTS,
     FORMAT,

@@ -132,7 +132,6 @@ RESULTS = (
 )
 
 # words for numbers in messages
-CHAMBERS = ('body', 'head', 'tail')
 CHAMBER_STATES = ('off', 'vacuum', 'positive')
 STATES = ('idle', 'running', 'holding', 'stopped', 'fault')
 FAULTS = ('none', 'over_pressure', 'sensor_range', 'sensor_stuck', 'regulator', 'supply_control', 'host_silent', 'watchdog', 'brown_out', 'restart')

@@ -12,7 +12,6 @@ from bifa.link.errors import LinkError, NoAnswerError, RefusedError, StillMoving
 from bifa.link.session import Counters, Hello, Session, word
 from bifa.link.table import (
     CHAMBER_STATES,
-    CHAMBERS,
     DEAD_TIME_MS,
     FAULT_UNITS,
     FAULTS,
@@ -23,6 +22,7 @@ from bifa.link.table import (
 )
 from bifa.link.transport import Clock, Transport
 from bifa.link.units import UnoParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
+from bifa.ranges import CHAMBERS
 
 EEPROM_TIMEOUT_S = 10.0
 CLOCK_EVERY_S = 1.0

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 
-from bifa.link.table import CHAMBER_STATES, CHAMBERS, CONSOLE_COMMANDS, PARAMETERS
+from bifa.link.table import CHAMBER_STATES, CONSOLE_COMMANDS, PARAMETERS
 from bifa.link.units import BY_NAME, range_text
+from bifa.ranges import CHAMBERS
 
 ON_OFF = {"on": "", "off": ""}
 SECOND = {

@@ -11,9 +11,9 @@ from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.patch_stdout import patch_stdout
 
 from bifa.link import Uno
-from bifa.link.table import CHAMBERS
 from bifa.live.completion import LineCompleter
 from bifa.live.conversation import Conversation
+from bifa.ranges import CHAMBERS
 from bifa.rig import Rig
 
 STATE_STYLES = {"running": "bg:ansigreen", "holding": "bg:ansiyellow", "stopped": "bg:ansired", "fault": "bg:ansired"}

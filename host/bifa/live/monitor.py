@@ -12,8 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from bifa.link import Clock, Sample, Uno
-from bifa.link.table import CHAMBERS
 from bifa.live.rounds import Latest, Pace
+from bifa.ranges import CHAMBERS
 from bifa.screen import Console
 
 REFRESH_S = 0.1

@@ -18,12 +18,13 @@ from bifa.errors import BifaError
 from bifa.files import is_stray
 from bifa.link import RefusedError, Sample, Uno
 from bifa.link.leaving import raise_if_unconfirmed
-from bifa.link.table import CHAMBERS, MARK_PAUSE
+from bifa.link.table import MARK_PAUSE
 from bifa.live.rounds import Absence
 from bifa.live.walk import raise_if_no_reader, stopped_text
 from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.printable import counted
+from bifa.ranges import CHAMBERS
 from bifa.rig import GONE, Rig, SameBoard
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning

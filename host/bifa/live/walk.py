@@ -8,8 +8,8 @@ import sys
 from collections.abc import Callable
 
 from bifa.link import Clock, LinkError, Status, Uno
-from bifa.link.table import CHAMBERS
 from bifa.live.rounds import Pace
+from bifa.ranges import CHAMBERS
 
 LOOK_EVERY_S = 0.5
 

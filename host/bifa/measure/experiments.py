@@ -10,7 +10,6 @@ import numpy as np
 from bifa.data import Trial
 from bifa.errors import BifaError
 from bifa.link import Uno
-from bifa.link.table import CHAMBERS
 from bifa.link.units import set_point_psi
 from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, camera_rate, resampled
@@ -18,6 +17,7 @@ from bifa.measure.plan import EXTENDED, PULL_MM, SNAP_PSI, PlannedTrial
 from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Bench, Recording, idle, mount
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.printable import counted
+from bifa.ranges import CHAMBERS
 
 CHAMBER_OF = {"large": "body", "small": "head"}
 SETTLE_S = 6.0  # for a pressure to settle: over three of the slowest time constants, 1.7 s (1 / body_alpha_s_per_s)

@@ -22,7 +22,6 @@ from bifa.data.layout import TABLE_FILE
 from bifa.data.lost import codes
 from bifa.data.sheet import Sheet
 from bifa.data.write import add_trial
-from bifa.link.table import CHAMBERS
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import (
     LONGEST_GAP_S,
@@ -36,6 +35,7 @@ from bifa.measure.alignment import (
 from bifa.measure.experiments import CHAMBER_OF, noted, set_point
 from bifa.measure.instruments import CHANNELS
 from bifa.measure.plan import PlannedTrial
+from bifa.ranges import CHAMBERS
 
 Columns = Mapping[str, np.ndarray]
 

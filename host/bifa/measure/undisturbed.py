@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from bifa.errors import BifaError
 from bifa.link import Sample
-from bifa.link.table import CHAMBERS
+from bifa.ranges import CHAMBERS
 
 _CONNECTED = {0.0: "vacuum", 1.0: "positive"}
 _SUPPLIES = set(_CONNECTED.values())

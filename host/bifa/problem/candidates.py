@@ -9,7 +9,7 @@ import numpy as np
 
 from bifa.data import Dataset, Trial
 from bifa.measure.plan import BRISK, EXTENDED, PULL_MM, PlannedTrial
-from bifa.robot.cpg import CHAMBERS
+from bifa.ranges import CHAMBERS
 from bifa.robot.gait import BASELINE, Gait
 from bifa.simulate import of_gait
 

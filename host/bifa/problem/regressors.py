@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bifa.problem.inputs import PullInputs, StaticInputs, StepInputs, WalkInputs
-from bifa.robot.cpg import CHAMBERS
+from bifa.ranges import CHAMBERS
 from bifa.simulate import Timeline
 from lacuna.system import Channels, Record
 

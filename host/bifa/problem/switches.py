@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bifa.data import Trial
-from bifa.robot.cpg import CHAMBERS
+from bifa.ranges import CHAMBERS
 from bifa.robot.gait import Gait
 from bifa.simulate import Timeline, of_gait, of_samples, recorded_commands, refine, timeline, vented_between
 from bifa.simulate.stepper import POSITIVE

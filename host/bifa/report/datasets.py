@@ -8,10 +8,10 @@ from pathlib import Path
 
 from bifa.data.dataset import Dataset, Trial, conditions_of
 from bifa.data.layout import is_command
+from bifa.ranges import CHAMBERS
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
 from bifa.report.picture import draw_chart
 from bifa.report.words import channel_words, unit_of
-from bifa.robot.cpg import CHAMBERS
 
 _MAX_POINTS = 4000  # pixels would show no more; the extremes of each stretch are kept
 _ROW_SPACING = 1.3  # distance between rows of commands

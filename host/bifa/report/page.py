@@ -16,9 +16,9 @@ import numpy as np
 from markupsafe import Markup
 
 from bifa.files import write_text
+from bifa.ranges import CHAMBERS
 from bifa.report.chart import Axis, Chart, Column, Series
 from bifa.report.style import PALETTES
-from bifa.robot.cpg import CHAMBERS
 from lacuna.report import page as engine
 from lacuna.report.page import Page, PageTable
 

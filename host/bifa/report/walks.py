@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from bifa.ranges import CHAMBERS
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, edges, thinned
 from bifa.report.evidence import BASE, COMPLETED
 from bifa.report.picture import draw_chart
-from bifa.robot.cpg import CHAMBERS
 
 MEASURED, SIMULATED = "measured", "simulated"
 _ROLES = {BASE: "before", COMPLETED: "after"}  # everything else is drawn in ink

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from math import floor, log10
 
 from bifa.effects import library
-from bifa.robot.cpg import CHAMBERS
+from bifa.ranges import CHAMBERS
 from bifa.robot.parameters import BASE_PARAMETERS
 
 # Phrases for the values of effects; without a phrase, an effect's values are listed with their meanings.

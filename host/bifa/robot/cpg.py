@@ -11,7 +11,6 @@ import numpy as np
 from bifa.robot.gait import Gait
 
 COUPLING_PER_S = 10.0  # alpha_phi of eq. (9)
-CHAMBERS = ("body", "head", "tail")
 
 
 def phase_offsets_rad(gait: Gait) -> np.ndarray:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from bifa.errors import BifaError
+from bifa.ranges import CHAMBERS
 from bifa.robot import cpg
 from bifa.robot.gait import Gait, gait_rows
 from bifa.simulate.compiled import kernel
@@ -137,7 +138,7 @@ def _fit_line(x: np.ndarray, y: np.ndarray, spread: float) -> tuple[float, float
 
 def recorded_commands(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Stack a walk's `command_body`, `command_head` and `command_tail`, shape (3, n)."""
-    return np.array([columns[f"command_{chamber}"] for chamber in cpg.CHAMBERS], dtype=float)
+    return np.array([columns[f"command_{chamber}"] for chamber in CHAMBERS], dtype=float)
 
 
 def gait_switches(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bifa.check.plausibility import check_plausibility
-from bifa.robot.cpg import CHAMBERS
+from bifa.ranges import CHAMBERS
 
 from .days import exchanged, head_only, inverted, mistaken, said, told, turned
 

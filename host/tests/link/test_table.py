@@ -8,7 +8,7 @@ import pytest
 
 from bifa.link import table
 from bifa.link.units import from_wire, range_text
-from bifa.ranges import RANGES
+from bifa.ranges import CHAMBERS, RANGES
 from harness.native import ROOT
 
 
@@ -19,7 +19,7 @@ def test_generated_files_are_up_to_date():
 
 
 ENUMS = {
-    "Chamber": ("lib/valves/chamber.h", table.CHAMBERS),
+    "Chamber": ("lib/valves/chamber.h", CHAMBERS),
     "ChamberState": ("lib/valves/chamber.h", table.CHAMBER_STATES),
     "State": ("lib/supervisor/state.h", table.STATES),
     "Fault": ("lib/supervisor/fault.h", table.FAULTS),

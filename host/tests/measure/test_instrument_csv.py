@@ -12,9 +12,10 @@ from bifa.cli import app
 from bifa.data import DatasetError, read_dataset
 from bifa.errors import BifaError
 from bifa.link import Uno
-from bifa.link.table import CHAMBERS, MARK_PAUSE
+from bifa.link.table import MARK_PAUSE
 from bifa.measure.instrument_csv import import_trial, read_instrument
 from bifa.measure.plan import PlannedTrial
+from bifa.ranges import CHAMBERS
 from bifa.rig import open_rig
 from bifa.robot import BASELINE
 from harness.exports import MACHINES, declarations, preset_of, write_export

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bifa import robot, simulate
-from bifa.robot.cpg import CHAMBERS
+from bifa.ranges import CHAMBERS
 from bifa.robot.gait import Gait
 from bifa.robot.stiffness import StiffnessCurve
 from bifa.simulate.stepper import OFF, POSITIVE, VACUUM

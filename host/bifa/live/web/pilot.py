@@ -14,9 +14,9 @@ from typing import Any
 
 from bifa.errors import BifaError
 from bifa.link import Clock, LinkError, RefusedError, Sample, StillMovingError, Uno
-from bifa.link.table import CHAMBERS
 from bifa.live.cycle_speed import CycleSpeed
 from bifa.live.rounds import Absence, Latest, Pace
+from bifa.ranges import CHAMBERS
 from bifa.rig import SameBoard
 
 REPORT_S = 0.1

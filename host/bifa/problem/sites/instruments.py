@@ -6,7 +6,7 @@ import numpy as np
 
 from bifa.problem.inputs import STATIC, STEP, WALK, Inputs, StaticInputs, StepInputs, WalkInputs
 from bifa.problem.sites.site import PLACE, PRESSURE, Range, Site, pressures, remembered, row_of
-from bifa.robot.cpg import CHAMBERS
+from bifa.ranges import CHAMBERS
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import Plant, layout
 from lacuna.system import Channels
