@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lacuna.diagnosis.candidate import Candidate
+from lacuna.check.model import predict_unchecked
 from lacuna.diagnosis.decide import Choice, dispersion_of
 from lacuna.diagnosis.search import Search
 from lacuna.estimation.noise import NoiseFloor
@@ -40,7 +40,7 @@ def next_experiment(choice: Choice, found: Search) -> NextExperiment:
     system, dispersion = rivals[0].fitted.structure.system, dispersion_of(found.tried)
     best = NextExperiment()
     for offer in system.candidate_experiments():
-        predictions = [_predict(c, offer) for c in rivals]
+        predictions = [predict_unchecked(system, c.fitted.theta, c.effects, offer.trial) for c in rivals]
         gains = [
             expected_gain(a, b, offer, found.floor) / dispersion
             for k, a in enumerate(predictions)
@@ -51,12 +51,6 @@ def next_experiment(choice: Choice, found: Search) -> NextExperiment:
             names = sorted(name for name in every if not all(name in c.effects for c in rivals))
             best = NextExperiment(tuple(names), offer.experiment, dict(offer.settings), float(min(gains)))
     return best if best.gain > _TELLS_APART else NextExperiment()
-
-
-def _predict(candidate: Candidate, offer: CandidateExperiment) -> Channels:
-    fitted = candidate.fitted
-    theta = fitted.theta | {p.name: p.value for p in fitted.structure.system.nuisances(offer.trial)}
-    return fitted.structure.system.predict(theta, candidate.effects, offer.trial)
 
 
 def expected_gain(a: Channels, b: Channels, offer: CandidateExperiment, floor: NoiseFloor) -> float:

@@ -11,7 +11,7 @@ from lacuna.estimation.fit import Fit
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.sampling import resample_evenly, sample_period
 from lacuna.estimation.structure import Structure
-from lacuna.system import Channels, Effect, Record
+from lacuna.system import Channels, Record
 
 _PEAKS = 3  # number of peaks of the residual's spectrum at which a frequency parameter starts
 _CELLS_A_LINE = 3  # minimum number of grid cells within a spectral line's width in the longest record
@@ -20,27 +20,26 @@ _LOCAL = 100  # cells over which the background is taken that a peak must stand 
 _MAX_POWER_RATIO = 20.0  # cap on a trial's power at a frequency, in multiples of its background
 
 
-def grown(parent: Fit, effect: str) -> Problem:
-    """The problem of a fit with one more effect, on the same trials and against the same floor."""
-    structure, problem = parent.structure, parent.problem
-    return Problem(
-        Structure(structure.system, (*structure.effects, effect)), problem.trials, problem.floor, problem.view
-    )
-
-
 def starts(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
-    """Starting vectors: the parent's values with the effect at a grid of sizes of either sign."""
+    """Starting vectors: the parent's values with the effect at a grid of sizes of either sign, and its frequency, if it
+    has one, at each of the residual's most prominent ones."""
     described = structure.system.effects[effect]
     base = structure.separate_ordered(structure.start(parent.theta), effect)
     vectors = [v for factor in described.start_factors for v in sized(structure, base, effect, factor)]
     if described.frequency is None:
         return vectors
-    return [v for vector in vectors for v in _at_peaks(parent, structure, described, vector)]
+    at = structure.names.index(f"{effect}.{described.frequency}")
+    parameter = structure.parameters[at]
+    found = peaks(parent.problem.trials, parent.scaled_residuals(), parameter.lower, parameter.upper, _PEAKS)
+    # there are no peaks in a range that no record resolves
+    return [np.where(np.arange(len(v)) == at, hz, v) for v in vectors for hz in found or [parameter.value]]
 
 
 def one_more(parent: Fit, effect: str) -> tuple[Problem, list[np.ndarray], Sequence[np.ndarray]]:
-    """The inputs of a fit with one more effect: its problem, starting vectors, and the parent's nuisances."""
-    problem = grown(parent, effect)
+    """The inputs of a fit with one more effect on the same trials and against the same floor: its problem, starting
+    vectors, and the parent's nuisances."""
+    known, old = parent.structure, parent.problem
+    problem = Problem(Structure(known.system, (*known.effects, effect)), old.trials, old.floor, old.view)
     return problem, starts(parent, problem.structure, effect), parent.solution.point.nuisances
 
 
@@ -56,20 +55,6 @@ def sized(structure: Structure, base: np.ndarray, effect: str, factor: float) ->
             vector[index] = np.clip(size, parameter.lower, parameter.upper)
         vectors.append(vector)
     return vectors
-
-
-def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndarray) -> list[np.ndarray]:
-    """Copies of `vector` with the effect's frequency at each of the residual's most prominent frequencies."""
-    index = structure.names.index(f"{effect.name}.{effect.frequency}")
-    parameter = structure.parameters[index]
-    problem = parent.problem
-    found = []
-    prominent = peaks(problem.trials, parent.scaled_residuals(), parameter.lower, parameter.upper, _PEAKS)
-    for frequency in prominent or [parameter.value]:  # there are no peaks in a range that no record resolves
-        moved = vector.copy()
-        moved[index] = frequency
-        found.append(moved)
-    return found
 
 
 def peaks(

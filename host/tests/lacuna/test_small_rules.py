@@ -9,10 +9,10 @@ import pytest
 
 import lacuna
 from lacuna import Effect, Parameter
-from lacuna.diagnosis.next_experiment import expected_gain
+from lacuna.diagnosis.next_experiment import expected_gain, next_experiment
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import Error, Floor
-from lacuna.diagnosis.sizes import grown, peaks, sized, starts
+from lacuna.diagnosis.sizes import one_more, peaks, sized
 from lacuna.diagnosis.warn import not_predicted
 from lacuna.estimation.fit import fit
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
@@ -47,6 +47,32 @@ def test_an_experiment_never_run_is_weighed_by_what_its_channel_has_had_elsewher
     assert gain("step") == gain("walk") == 5.0
 
 
+def test_an_experiment_that_a_rival_cannot_predict_is_not_proposed(monkeypatch):
+    def simulate(record, theta):
+        if theta.slope > 2.0:
+            raise ValueError("beyond the end of the curve")
+        return {"y": theta.slope * record.time_s}
+
+    trial = Record("next", "run", "c", np.arange(9.0), {"y": np.full(9, np.nan)})
+    system = lacuna.System(
+        simulate, [Parameter("slope", "", 1.0, -5.0, 5.0)], experiments=[CandidateExperiment("run", {}, trial)]
+    )
+    floor = NoiseFloor({("run", "y"): ChannelNoise(1.0, 0.0, 1.0, 3)})
+    rivals = [explanation(system, effects=(name,), slope=slope) for name, slope in (("a", 1.0), ("b", 3.0))]
+    found = SimpleNamespace(with_effects=lambda effects: rivals[1], tried=rivals, floor=floor)
+    monkeypatch.setattr("lacuna.diagnosis.next_experiment.dispersion_of", lambda tried: 1.0)
+    choice = SimpleNamespace(candidate=rivals[0], confusable_with={"a": ("b",)})
+    assert next_experiment(choice, found).experiment is None
+    rivals[1].fitted.theta["slope"] = -1.0  # can be predicted
+    assert next_experiment(choice, found).experiment == "run"
+
+
+def explanation(system, effects, **theta):
+    return SimpleNamespace(
+        effects=effects, fitted=SimpleNamespace(theta=theta, structure=SimpleNamespace(system=system))
+    )
+
+
 def test_a_frequency_that_no_record_resolves_begins_at_its_typical_value():
     """Records sampled at 10 Hz show no peak at 50 Hz; without a start there, the effect would never be tried."""
     sizes = (Parameter("size", "", 0.3, 0.0, 5.0), Parameter("f_Hz", "Hz", 50.3, 20.0, 100.0))
@@ -60,8 +86,8 @@ def test_a_frequency_that_no_record_resolves_begins_at_its_typical_value():
 
     system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -5.0, 5.0)], hum).with_trials(trials)
     parent = fit(Structure(system), trials, estimate_noise(system, trials))
-    structure = grown(parent, "hum").structure
-    assert {structure.theta(values)["hum.f_Hz"] for values in starts(parent, structure, "hum")} == {50.3}
+    problem, begun, _ = one_more(parent, "hum")
+    assert {problem.structure.theta(values)["hum.f_Hz"] for values in begun} == {50.3}
 
 
 def test_what_a_trial_has_of_its_own_may_lie_anywhere_if_nothing_is_said_of_its_spread():
