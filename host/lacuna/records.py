@@ -211,10 +211,11 @@ def _samples(column: Any, record: str, name: str) -> np.ndarray:
     cells = [_of_cell(cell) for cell in column.ravel()]
     if None in cells:
         at = cells.index(None)
+        sample = at // (column.size // len(column)) if column.ndim else at
         seconds = "; count seconds from its start" if name in TIMES else ""
         raise RecordError(
-            f"record {record}, sample {at}: column {name} has {column.ravel()[at]!r}, which is not a number{seconds}."
-            " Replace it by a number, or leave the column out."
+            f"record {record}, sample {sample}: column {name} has {column.ravel()[at]!r}, which is not a"
+            f" number{seconds}. Replace it by a number, or leave the column out."
         )
     return np.array(cells, float).reshape(column.shape)
 
@@ -382,7 +383,8 @@ def _encoding(file: Path) -> str:
     try:
         raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line, byte = raw.count(b"\n", 0, error.start) + 1, raw[error.start]
+        read = error.object  # without a byte order mark
+        line, byte = read.count(b"\n", 0, error.start) + 1, read[error.start]
     return (
         f"{file.name}, line {line}: byte 0x{byte:02x} is not UTF-8; save it as UTF-8 text (a file that begins with 0xff"
         " or 0xfe is UTF-16, as spreadsheets write it), or read it with pandas, read_csv(..., encoding=...), and give"

@@ -9,7 +9,7 @@ from math import inf
 
 import numpy as np
 
-from lacuna.check.numbers import SAME, first, spread
+from lacuna.check.numbers import SAME, spread
 from lacuna.errors import MisuseError, TooLittleDataError
 from lacuna.records import TIMES, describe_reversal
 from lacuna.system import Record, System, by_channel
@@ -85,7 +85,7 @@ def _check_record(trial: Record) -> None:
             " table belong together in one record."
         )
     if not np.isfinite(time).all():
-        raise MisuseError(f"trial {trial.name}: time at sample {first(~np.isfinite(time))} is not a number.")
+        raise MisuseError(f"trial {trial.name}: time at sample {np.argmax(~np.isfinite(time))} is not a number.")
     if said := describe_reversal(time):
         raise MisuseError(f"trial {trial.name}: {said}.")
     if not trial.channels:
@@ -98,7 +98,9 @@ def _check_record(trial: Record) -> None:
         if column.shape != time.shape:
             raise MisuseError(f"{where}: measured with shape {column.shape}, but the times have {time.shape}.")
         if np.isinf(column).any():
-            raise MisuseError(f"{where}: infinite at sample {first(np.isinf(column))}; mark missing samples as NaN.")
+            raise MisuseError(
+                f"{where}: infinite at sample {np.argmax(np.isinf(column))}; mark missing samples as NaN."
+            )
         if np.isfinite(column).sum() < _FEWEST_SAMPLES:
             raise MisuseError(
                 f"{where}: fewer than {_FEWEST_SAMPLES} valid samples. Give the record as a lacuna.Record whose"
@@ -112,7 +114,7 @@ def gaps_in_inputs(trials: Sequence[Record]) -> Iterable[str]:
         for name, column in trial.inputs.items():
             column = np.asarray(column)
             if column.dtype.kind == "f" and not np.isfinite(column).all():
-                at = f" at sample {first(~np.isfinite(column))}" if column.ndim else ""
+                at = f" at sample {np.argwhere(~np.isfinite(column))[0][0]}" if column.ndim else ""
                 where = f"Trial {trial.name}, input {name}"
                 yield f"{where}: no number{at}; a model that uses this input cannot predict from there on."
 

@@ -31,11 +31,6 @@ def changed(found: Channels, before: Channels, trial: Record, share: float) -> s
     )
 
 
-def first(true: np.ndarray) -> int:
-    """Index of the first true element."""
-    return int(np.flatnonzero(true)[0])
-
-
 def within(experiment: str, experiments: Iterable[str]) -> str:
     """The phrase " in {experiment}", or nothing if there is only one experiment."""
     return f" in {experiment}" if len(set(experiments)) > 1 else ""

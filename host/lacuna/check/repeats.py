@@ -33,8 +33,9 @@ def check_times(trials: Sequence[Record]) -> None:
 
 
 def check_inputs(system: System, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> Iterator[str]:
-    """Raise MisuseError if the inputs of repeats differ much (`_OTHER`) and change the prediction; warn of columns that
-    differ without doing so. `predictions`: at the initial values, of the trials that can be predicted."""
+    """Raise MisuseError if the inputs of repeats differ much (`_MAX_INPUT_DIFFERENCE`) and change the prediction; warn
+    of columns that differ without doing so. `predictions`: of the trials that can be predicted, at the initial values.
+    """
     ignored: dict[str, str] = {}
     for first, other, name, its, said in _differences([t for t in trials if t.name in predictions]):
         there = replace(first, inputs={**first.inputs, name: its})

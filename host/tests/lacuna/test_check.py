@@ -423,8 +423,11 @@ def test_a_gap_in_an_input_of_every_record_is_the_reason_why_nothing_is_predicte
         said_of(given)
 
 
-def test_warns_of_an_input_with_a_gap():
-    outside_C = np.where(np.arange(len(heater.TIME_S)) == 7, np.nan, 20.0)
+@pytest.mark.parametrize("places", [1, 3])
+def test_warns_of_an_input_with_a_gap(places):
+    outside_C = np.full((len(heater.TIME_S), places), 20.0)
+    outside_C[7, -1] = np.nan
+    outside_C = outside_C.squeeze()
     given = {name: one | {"outside_C": outside_C} for name, one in heater.records(2).items()}
     said = said_of(given)
     assert len(said) >= len(given)

@@ -1,5 +1,6 @@
 """CSV folders as found in practice: labels in words, byte-order marks, and cells that are not numbers."""
 
+import codecs
 import importlib
 import tempfile
 from pathlib import Path
@@ -157,6 +158,7 @@ REFUSED_ARRAYS = {
     "a record of y, u has no times: give a column time_s": {"y": np.zeros(9), "u": np.zeros(9)},
     r"sample 0: column force has .*1,000\.5.*not a number": {"time_s": [0.0, 1.0], "force": ["1,000.5", "2"]},
     "sample 1: column note .*windy.*leave the column out": {"time_s": [0.0, 1.0], "note": ["", "windy"]},
+    "sample 1: column wind .*calm": {"time_s": [0.0, 1.0], "wind": [["1", "2", "3"], ["4", "calm", "6"]]},
 }
 
 
@@ -231,8 +233,9 @@ def test_what_systems_and_office_programs_leave_is_no_record(tmp_path):
 # -- messages ------------------------------------------------------------------------------------------------------
 
 
-def test_another_encoding_is_named_with_its_line(tmp_path):
-    (tmp_path / "a.csv").write_bytes("time_s,y\n0,1\n1,2µ\n".encode("latin-1"))
+@pytest.mark.parametrize("mark", [b"", codecs.BOM_UTF8])
+def test_another_encoding_is_named_with_its_line(tmp_path, mark):
+    (tmp_path / "a.csv").write_bytes(mark + "time_s,y\n0,1\n1,2µ\n".encode("latin-1"))
     with pytest.raises(RecordError, match=r"a\.csv, line 3: byte 0xb5 is not UTF-8; save it as UTF-8"):
         read(tmp_path)
 
