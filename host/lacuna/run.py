@@ -215,7 +215,7 @@ def _with_residual_warnings(
         hidden = [
             key
             for key, noise in levels.items()
-            if not (noise.repeats or system.noise_time_s(*key) or key in found.left.remainder.found)
+            if not (noise.repeats or system.noise_time_s(*key) or key in found.left.found)
         ]
         said += [
             f"{100 * d.share:.0f} % of the residual variance of {d.channel} follows {' and '.join(d.quantities)},"
@@ -229,9 +229,9 @@ def _with_residual_warnings(
 
 def _white(found: Diagnosis, left_s: Mapping[str, float]) -> dict[str, float]:
     """RMS residual of the channels in which something is left that has no correlation time and depends on nothing."""
-    dependent = {d.channel for d in found.left.signature.dependences}
+    dependent = {d.channel for d in found.left_signature.dependences}
     left = residual_rms(found)
-    keys = [key for key in found.left.remainder.found if left_s.get(key[1]) == 0.0 and key[1] not in dependent]
+    keys = [key for key in found.left.found if left_s.get(key[1]) == 0.0 and key[1] not in dependent]
     return {channel: max(left[key] for key in keys if key[1] == channel) for _, channel in keys}
 
 

@@ -125,13 +125,17 @@ class Case:
 
     @_cached
     def settled(self, candidate: Candidate) -> Fit:
-        """The explanation at its optimum, with fresh derivatives: the basis of reported parameters. If the system sets
-        `tells_of_all`, it is fitted to every trial: those that judged may inform parameters once judging is over."""
-        fitted, others = self.on_known(candidate), self.split.not_fitted
-        if self.system.tells_of_all and others:
-            near = (fitted, evaluate_on(fitted, others))
-            fitted = refit_on(fitted, (*fitted.problem.trials, *others), near=near, relative=_FINE)
-        return settle(refit_at_misfit(relax_priors(fitted)))
+        """The explanation at its optimum, with fresh derivatives: the basis of reported parameters."""
+        return settle(refit_at_misfit(relax_priors(self.on_every(self.on_known(candidate), relative=_FINE))))
+
+    def on_every(self, fitted: Fit, **options: Any) -> Fit:
+        """Refit to every trial if the system sets `tells_of_all`: those that judged may inform parameters once judging
+        is over."""
+        others = self.split.not_fitted
+        if not (self.system.tells_of_all and others):
+            return fitted
+        near = (fitted, evaluate_on(fitted, others))
+        return refit_on(fitted, (*fitted.problem.trials, *others), near=near, **options)
 
     @_cached
     def intervals(self, candidate: Candidate) -> dict[str, tuple[float, float]]:

@@ -69,9 +69,7 @@ def choose(search: Search, policy: Policy, matters: Judgement) -> Choice:
     held = [c for c in search.tried if not any(against.is_dominated(c, other) for other in everything)]
     held.sort(key=lambda c: (len(c.effects), against.form(c).cost))
     weights = _weights(_compared(search, best), against.dispersion)
-    chosen = next(
-        (c for c in held if not against.is_significantly_worse(c, best) or _supported(c, weights, policy)), None
-    )
+    chosen = next((c for c in held if against.why_by_chance(c, best) or _supported(c, weights, policy)), None)
     chosen = chosen or (held[0] if held else best)
     while (smaller := _without_one(chosen, search, against)) is not None:
         chosen = smaller
@@ -81,10 +79,12 @@ def choose(search: Search, policy: Policy, matters: Judgement) -> Choice:
 def _supported(candidate: Candidate, weights: dict[tuple[str, ...], float], policy: Policy) -> bool:
     if not candidate.effects:
         return True
-    if candidate.effects not in weights:
+    # a set that was fitted again may name its effects in another order
+    weighed = next((effects for effects in weights if frozenset(effects) == frozenset(candidate.effects)), None)
+    if weighed is None:
         return False
-    rivals = _rivals(candidate.effects, weights, policy)
-    return min(_total_weight(e, weights, rivals) for e in candidate.effects) >= policy.supported
+    rivals = _rivals(weighed, weights, policy)
+    return min(_total_weight(e, weights, rivals) for e in weighed) >= policy.supported
 
 
 def _total_weight(effect: str, weights: dict[tuple[str, ...], float], rivals: Sequence[tuple[str, ...]]) -> float:
@@ -124,19 +124,16 @@ class Comparison:
 
     def why_not_worse(self, one: Candidate, other: Candidate) -> str:
         """Say why `other` is not preferred to `one`; empty if it is."""
-        if chance := self._why_by_chance(one, other):
+        if chance := self.why_by_chance(one, other):
             return chance
         if self._is_much_worse(one, other) and self.matters(one, other):
             return ""
         return "it closes too little of what is missing in records that were not fitted"
 
-    def is_significantly_worse(self, one: Candidate, other: Candidate) -> bool:
-        """Whether `other` is better by more than noise and remaining misfit can explain, on trials that it was not
-        fitted to as well, and robustly to the choice of conditions measured."""
-        return not self._why_by_chance(one, other)
-
-    def _why_by_chance(self, one: Candidate, other: Candidate) -> str:
-        """Say why `other` may be better than `one` by chance only; empty if it is better beyond doubt."""
+    def why_by_chance(self, one: Candidate, other: Candidate) -> str:
+        """Say why `other` may be better than `one` by chance only. Empty if it is better beyond doubt: by more than
+        noise and remaining misfit can explain, on trials that it was not fitted to as well, and robustly to the choice
+        of conditions measured."""
         least = self.policy.gain * _extra(one, other)
         gain = (one.cost - other.cost) / self.dispersion
         if gain <= least:

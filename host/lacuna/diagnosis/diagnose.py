@@ -29,23 +29,10 @@ from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.workers import STOPPED, OnProgress, Stoppable, Workers
 from lacuna.errors import MisuseError, TooLittleDataError
-from lacuna.estimation.fit import Fit, evaluate_on, refit_on
+from lacuna.estimation.fit import Fit
 from lacuna.estimation.shrink import shrunk
 from lacuna.estimation.solve import one_thread
 from lacuna.system import Correction, CorrectionSite, System
-
-
-@dataclass(frozen=True)
-class Left:
-    """What remains after the named effects (or the base model); `share_of_gap` is relative to the base model's gap."""
-
-    remainder: Remainder
-    signature: Signature
-    share_of_gap: float
-
-    @property
-    def matters(self) -> bool:
-        return self.remainder.matters
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,7 +45,8 @@ class Diagnosis:
     held up on the final trials. `base_parameters`: the base model's parameters fitted jointly with the named effects;
     empty if the data remain unexplained. `told`: the fit that reported parameters, intervals and warnings come from;
     for a model given as a plain function it is fitted to every trial. `signature`: where the residual of the base model
-    lies and what it depends on; `left`: what the named effects leave.
+    lies and what it depends on; `left`, `left_signature`: the same of what the named effects (or the base model) leave;
+    `left_share`: relative to the base model's gap.
     """
 
     verdict: str
@@ -73,7 +61,9 @@ class Diagnosis:
     floor: Floor
     remainder_before: Remainder
     signature: Signature
-    left: Left
+    left: Remainder
+    left_signature: Signature
+    left_share: float
     nearest: tuple[Nearest, ...]
     warnings: tuple[str, ...]
     learnt: tuple[tuple[CorrectionSite, Correction], ...]
@@ -163,10 +153,7 @@ def _fit_to_report(case: Case, judged: Assessment, shown: Candidate, final: Fit)
     """The fit to report from: the explanation's, or the final one if that has curves or nothing is explained."""
     if judged.verdict != "unexplained" and not final.structure.sites:
         return case.settled(shown)
-    others = case.split.not_fitted if case.system.tells_of_all else ()
-    if not others:
-        return final
-    return refit_on(final, (*final.problem.trials, *others), near=(final, evaluate_on(final, others)))
+    return case.on_every(final)
 
 
 def _chosen(case: Case, found: Search, workers: Workers) -> Choice:
@@ -283,7 +270,8 @@ def _unsupported(case: Case, found: Search, tried: Sequence[Nearest]) -> list[st
         return []
     against = Comparison(found, case.policy, case.exceeds)
     base, other = (case.cross_validated.get(one, one) for one in (found.base, against.form(near)))
-    return warn.unsupported(near.effects, against.why_not_worse(base, other))
+    why = against.why_not_worse(base, other)
+    return [f"{' and '.join(near.effects)} is not supported: {why}."] if why else []
 
 
 def _reported(
@@ -299,7 +287,6 @@ def _reported(
     (final, told), identified, before = fits, judged.verdict == "identified", judged.before
     closed = share_of_gap(before.held_out, judged.after.held_out, judged.floor.held_out) if identified else 0.0
     shown = choice.candidate if identified else found.base
-    signature = describe(judged.explained, judged.left, judged.drifts)
     effects = describe_effects(case, found, choice, closed) if identified else ()
     tried = nearest(case, found, choice if identified else None)
     return Diagnosis(
@@ -315,7 +302,9 @@ def _reported(
         floor=judged.floor,
         remainder_before=judged.remainder,
         signature=describe(judged.base, judged.remainder, judged.drifts, unshared=judged.unshared),
-        left=Left(judged.left, signature, 1.0 - closed),
+        left=judged.left,
+        left_signature=describe(judged.explained, judged.left, judged.drifts),
+        left_share=1.0 - closed,
         nearest=tried,
         warnings=(
             *warn.repeats_apart(judged.floor),

@@ -12,7 +12,7 @@ from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.values import plain
 
 FORMAT = 2
-_TRIED = 8  # explanations listed, the best first
+_TRIED = 8  # explanations listed, the best first, besides the base model
 
 
 def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -39,14 +39,14 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             },
             "remainder": {  # what the named effects leave
                 "matters": left.matters,
-                "share_of_gap": _share(left.share_of_gap, d) if d.effects else 1.0,
+                "share_of_gap": _share(d.left_share, d) if d.effects else 1.0,
                 # RMS of what repeats share, in floors, where that is largest
-                "times_floor": math.sqrt(max(left.remainder.largest, 0.0)),
-                "experiments": list(dict.fromkeys(experiment for experiment, _ in left.remainder.found)),
-                "depends_on": left.signature.depends_on,
+                "times_floor": math.sqrt(max(left.largest, 0.0)),
+                "experiments": list(dict.fromkeys(experiment for experiment, _ in left.found)),
+                "depends_on": d.left_signature.depends_on,
                 "learnt": [site.name for site, _ in d.learnt],
-                "cannot_tell": list(left.remainder.cannot_tell),
-                "text": left.signature.text,
+                "cannot_tell": list(left.cannot_tell),
+                "text": d.left_signature.text,
             },
             "nearest": [{"effects": r.effects, "share_of_gap": _share(r.share_of_gap, d)} for r in d.nearest],
             "warnings": d.warnings,
@@ -68,7 +68,8 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             "learnt": (),
             "compared": [one._asdict() for one in d.choice.compared],
             "tried": [
-                {"effects": c.effects, "error": c.rms} for c in sorted(d.search.tried, key=lambda c: c.cost)[:_TRIED]
+                {"effects": c.effects, "error": c.rms}
+                for c in dict.fromkeys((*sorted(d.search.tried, key=lambda c: c.cost)[:_TRIED], d.search.base))
             ],
             "not_detectable_here": [name for name in d.search.unseen if name not in {e.name for e in d.effects}],
             "next_experiment": {"separates": d.next.separates, "experiment": d.next.experiment},

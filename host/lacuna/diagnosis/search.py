@@ -48,7 +48,8 @@ class Search:
 
     def freed_form(self, candidate: Candidate) -> Candidate | None:
         """The same effects in freed form, if that explains more; otherwise None."""
-        return next((c for c in self.freed if c.effects == candidate.effects and c.cost < candidate.cost), None)
+        same = frozenset(candidate.effects)
+        return next((c for c in self.freed if frozenset(c.effects) == same and c.cost < candidate.cost), None)
 
 
 def search(
@@ -74,6 +75,7 @@ def search(
     found = raced(first, _singles(case, scores))
     if better := escape_local_optimum(first, found, split):
         workers.on_progress("the base model was in a local optimum: continuing from a better one")
+        keep([better])
         if enough(better):
             return Search(better, floor, (better, *found), scores.screened())
         scores, tried[frozenset()] = score(better.fitted, list(case.system.effects), workers), better
@@ -90,7 +92,12 @@ def search(
                 break
             workers.on_progress("weighing again against a lower floor")
             floor = lower
-            tried = _reweigh_all(tried, size, split, lower, case.policy.reach)
+            # the base model and what may still win are refitted
+            near, leading = case.policy.reach * ranked[0].cost, ranked[:_PARENTS]
+            tried = {
+                s: reweighed(c, split, lower, thoroughly=not s or c in leading or c.cost < near)
+                for s, c in tried.items()
+            }
             freed = [reweighed(c, split, lower) for c in freed]
             ranked = _ranked(tried, size)
         if enough(ranked[0]):
@@ -207,15 +214,6 @@ def escape_local_optimum(base: Candidate, singles: Sequence[Candidate], split: S
         return None
     better = refitted_without(nearest, (), split)
     return better if base.cost - better.cost > max(base.policy.promising * base.excess, _MIN_GAIN) else None
-
-
-def _reweigh_all(
-    tried: dict[frozenset[str], Candidate], size: int, split: Split, floor: NoiseFloor, reach: float
-) -> dict[frozenset[str], Candidate]:
-    """Everything tried against another floor; the base model and what may still win are refitted."""
-    ranked = _ranked(tried, size)
-    near, leading = reach * ranked[0].cost, ranked[:_PARENTS]
-    return {s: reweighed(c, split, floor, thoroughly=not s or c in leading or c.cost < near) for s, c in tried.items()}
 
 
 def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thoroughly: bool = True) -> Candidate:

@@ -62,11 +62,6 @@ def explains_too_little(choice: Choice, split: Split, tested: float | None, poli
     return [f"{named} predicts better beyond doubt, but explains too little of what is missing to be named."]
 
 
-def unsupported(effects: Sequence[str], why: str) -> list[str]:
-    """A warning for the nearest explanation that is not supported; none if `why` is empty."""
-    return [f"{' and '.join(effects)} is not supported: {why}."] if why else []
-
-
 def doubts(choice: Choice, split: Split, tested: float | None) -> list[str]:
     """Warnings for named effects: a larger explanation has more weight, or there is only one final trial. `tested`: the
     share of the gap that the effects close on the final trials; None without a gap."""

@@ -1,6 +1,7 @@
 """The outputs of a diagnosis: a page, a record, and doubts about its verdict."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
 from toy import hide
@@ -51,6 +52,12 @@ def test_what_is_named_is_not_what_the_data_would_hardly_show(found):
     hidden = as_record(found)["not_detectable_here"]
     assert hidden
     assert "delay" not in hidden
+
+
+def test_the_base_model_is_among_what_was_tried_however_many_explanations_are_better(found):
+    better = [Mock(effects=(f"effect {k}",), rms=1.0, cost=-1.0 - k) for k in range(9)]
+    record = as_record(replace(found, search=replace(found.search, tried=(found.search.base, *better))))
+    assert [one["effects"] for one in record["tried"]] == [*([f"effect {k}"] for k in range(8, 0, -1)), []]
 
 
 def test_where_something_matters_it_is_told_where(found):
