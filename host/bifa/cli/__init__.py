@@ -28,10 +28,12 @@ class _Commands(typer.core.TyperGroup):
         try:
             with writable():
                 return super().invoke(ctx)
-        except KeyboardInterrupt as interrupt:
-            from bifa.link.leaving import raise_if_unconfirmed
-
-            raise_if_unconfirmed(interrupt)
+        except BaseException as error:
+            # Whatever replaced an unconfirmed stop (a Ctrl-C, output that nobody reads, a full disk) must not hide it.
+            if leaving := sys.modules.get("bifa.link.leaving"):  # otherwise no robot was connected
+                leaving.raise_if_unconfirmed(error)
+            if not isinstance(error, KeyboardInterrupt):
+                raise
             typer.echo("\nInterrupted. Finished results are listed above; no partial files remain.", err=True)
             raise typer.Exit(130) from None
 

@@ -65,8 +65,10 @@ def enter(robot: Mover) -> None:
                 _earlier_handlers[number] = signal.signal(number, handler)
         _earlier_hook.append(sys.unraisablehook)
         sys.unraisablehook = _retry_interrupt
+        _active_robots.append(robot)
         _watch_parent()
-    _active_robots.append(robot)
+    else:
+        _active_robots.append(robot)
 
 
 def leave(robot: Mover) -> None:
@@ -147,6 +149,8 @@ def _watch_parent() -> None:
     _parents.append(os.getppid())
     signal.signal(_DEATH, _on_parent_death)
     _prctl(_SET_DEATH_SIGNAL, int(_DEATH))
+    if os.getppid() != _parents[-1]:  # it died before it was watched
+        signal.raise_signal(_DEATH)
 
 
 def death_signal() -> int | None:
@@ -183,13 +187,13 @@ def _interrupt_main_thread() -> None:
         signal.raise_signal(signal.SIGINT)
 
 
-def raise_if_unconfirmed(interrupt: KeyboardInterrupt) -> None:
-    """Raise the StillMovingError that `interrupt` replaced, if any: a Ctrl-C during the clean-up after an unconfirmed
-    stop must not hide it. Whoever ends on a KeyboardInterrupt calls this first."""
-    replaced = interrupt.__context__
+def raise_if_unconfirmed(last: BaseException) -> None:
+    """Raise the StillMovingError that `last` replaced, if any: a Ctrl-C during the clean-up after an unconfirmed stop,
+    or output that fails there, must not hide it. Whoever ends on a KeyboardInterrupt calls this first."""
+    replaced = last.__context__
     while replaced is not None:
         if isinstance(replaced, StillMovingError):
-            raise replaced from interrupt
+            raise replaced from last
         replaced = replaced.__context__
 
 

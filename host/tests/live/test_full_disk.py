@@ -2,6 +2,7 @@
 
 import errno
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -67,6 +68,22 @@ def test_who_walks_stops_once_nobody_can_read_it_any_more(uno, gait, command, tm
         _, errors = walking.communicate(timeout=60)
     assert (walking.returncode, errors) == (1, "")  # like any program whose reader has gone
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
+
+
+@pytest.mark.parametrize("command", [["upload", "{gait}", "--run"], ["record", "--gait", "{gait}", "--out", "{out}"]])
+def test_output_that_nobody_reads_does_not_hide_that_the_robot_may_be_moving(uno, gait, command, tmp_path):
+    command = bifa(*(word.format(gait=gait, out=tmp_path / "walk") for word in command), "--port", uno.device)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as walking:
+        while uno.board.state != "running":
+            assert walking.poll() is None
+            time.sleep(0.05)
+        uno.board.write = lambda data: None  # a wire is broken
+        walking.send_signal(signal.SIGINT)
+        walking.stdout.close()
+        walking.stdout = None
+        _, errors = walking.communicate(timeout=60)
+    assert walking.returncode == 2
+    assert "MAY STILL BE MOVING" in errors
 
 
 def test_a_console_with_its_input_closed_says_so(uno):
