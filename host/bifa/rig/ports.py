@@ -40,8 +40,3 @@ def serial_ports() -> list[SerialPort]:
     ]
     boards = list(UNO_IDENTITIES.values())
     return sorted(ports, key=lambda port: (boards.index(port.board) if port.board else len(boards), port.device))
-
-
-def uno_ports() -> list[SerialPort]:
-    """Return the ports that a known Uno is connected to."""
-    return [port for port in serial_ports() if port.board]

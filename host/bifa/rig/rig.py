@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 from bifa.errors import BifaError
 from bifa.link import NoAnswerError, PortGoneError, RestartedError, StillMovingError
 from bifa.link.transport import Clock, Transport, WallClock
-from bifa.rig.ports import serial_ports, uno_ports
+from bifa.rig.ports import serial_ports
 from bifa.rig.serial_transport import SerialTransport
 
 ENTRY_POINTS = "bifa.rigs"
@@ -82,13 +82,14 @@ class SerialRig:
 def find_port() -> str:
     """Return the port of the only Uno that is plugged in, found by its USB identity. Raises RigError, listing the
     ports, if there is none or several."""
-    unos = uno_ports()
+    ports = serial_ports()
+    unos = [port for port in ports if port.board]
     if len(unos) == 1:
         return unos[0].device
     if unos:
         names = ", ".join(f"{port.device} ({port.board})" for port in unos)
         raise RigError(f"there are several Unos: {names}; choose one with --port")
-    others = ", ".join(f"{port.device} ({port.description})" for port in serial_ports()) or "none"
+    others = ", ".join(f"{port.device} ({port.description})" for port in ports) or "none"
     raise RigError(
         f"no Uno is plugged in (USB serial ports: {others}); plug it in, name its port with --port, "
         "or use the virtual robot: --port virtual"

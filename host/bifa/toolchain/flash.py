@@ -9,11 +9,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import serial
-
 from bifa.computer import PORT_BUSY, PORT_REFUSED
 from bifa.rig import find_port
-from bifa.rig.unopened import why_unopened
+from bifa.rig.serial_transport import SerialTransport
 from bifa.toolchain.project import ENVIRONMENT, ToolchainError, image_path, platformio_program
 
 BAUD = "115200"  # of optiboot, the Uno's bootloader
@@ -35,14 +33,9 @@ REMEDIES = (
 
 
 def choose_port(port: str | None) -> str:
-    """Return the port to write to: the given one or that of the only Uno. Raises ToolchainError if it does not
-    open."""
-    if port is None:
-        port = find_port()
-    try:
-        serial.Serial(port, exclusive=True).close()
-    except (serial.SerialException, OSError) as error:
-        raise ToolchainError(why_unopened(port, error)) from error
+    """Return the port to write to: the given one or that of the only Uno. Raises PortGoneError if it does not open."""
+    port = find_port() if port is None else port
+    SerialTransport(port).close()
     return port
 
 
@@ -93,12 +86,8 @@ def _run(name: str, command: Sequence[str | Path], folder: Path, port: str, on_l
             process.wait()
             raise
     if process.returncode:
-        raise ToolchainError(_sentence(name, list(last), port))
-
-
-def _sentence(name: str, lines: list[str], port: str) -> str:
-    output = "\n".join(lines)
-    for pattern, remedy in REMEDIES:
-        if re.search(pattern, output, re.IGNORECASE):
-            return remedy.format(port=port or "the port")
-    return f"{name} failed; its last lines:\n{output}"
+        output = "\n".join(last)
+        for pattern, remedy in REMEDIES:
+            if re.search(pattern, output, re.IGNORECASE):
+                raise ToolchainError(remedy.format(port=port or "the port"))
+        raise ToolchainError(f"{name} failed; its last lines:\n{output}")
