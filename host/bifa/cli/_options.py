@@ -49,11 +49,12 @@ def gait_names() -> list[str]:
 
 
 def stages() -> list[str]:
-    """Names of a campaign's stages."""
+    """Names of the stages of a virtual and of a real campaign."""
     from bifa.campaign.loop import campaign
     from bifa.campaign.setup import Effort, Setup
 
-    return [stage.name for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)]
+    campaigns = (campaign(Setup(port), Effort(), lambda what, share: None) for port in ("virtual", ""))
+    return list(dict.fromkeys(stage.name for stages in campaigns for stage in stages))
 
 
 def port_option(text: str = "Serial port, `virtual`, or the name of a rig (default: detected).") -> Any:

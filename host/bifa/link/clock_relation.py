@@ -29,9 +29,6 @@ class ClockRelation:
         self._exchanges: deque[tuple[float, float, float]] = deque(maxlen=EXCHANGES_KEPT)
         self._line: tuple[float, float, float] | None = None
 
-    def __len__(self) -> int:
-        return len(self._exchanges)
-
     def add(self, sent_s: float, uno_s: float, received_s: float) -> None:
         """Add an exchange: the Uno read `uno_s` at some moment between the host's `sent_s` and `received_s`."""
         if self._exchanges and self._has_jumped(sent_s, uno_s, received_s):
@@ -55,20 +52,9 @@ class ClockRelation:
         """Return to_host() without the bound; cheap enough for every sample of a stream."""
         if self._line is None:
             uno_0 = self._origin()[0]
-            self._line = (uno_0, self.to_host(uno_0).time_s, 1 + self.drift)
+            self._line = (uno_0, self.to_host(uno_0).time_s, sum(self._extremes((0.0, 1.0))) / 2)
         uno_0, host_0, rate = self._line
         return host_0 + rate * (uno_s - uno_0)
-
-    @property
-    def drift(self) -> float:
-        """How much faster the host's clock runs than the Uno's, as a fraction."""
-        low, high = self._extremes((0.0, 1.0))
-        return (low + high) / 2 - 1
-
-    @property
-    def bound_s(self) -> float:
-        """Error bound at the middle of the exchanges."""
-        return self.to_host(self._origin()[0]).bound_s
 
     def _origin(self) -> tuple[float, float]:
         """Middle of the exchanges: (Uno time, host time)."""

@@ -75,11 +75,6 @@ def encode(message: Message, sequence: int, values: tuple[Any, ...], seed: int) 
     return b"\0\0" + mask(cobs_encode(body + checks(body, seed))) + b"\0"
 
 
-def encode_name(name: str) -> bytes:
-    """Encode a preset's name as a field."""
-    return name.encode().ljust(NAME_BYTES, b"\0")
-
-
 STOP_FRAME = encode(COMMANDS["stop_now"], 0, (), OPEN_SEED)
 # An intact stop frame takes effect whatever the receiver's state, because two delimiters precede it. So one of the two
 # takes effect, whichever byte the line damages, loses or inserts.

@@ -462,7 +462,7 @@ def _unwrap_sequence(sequence: int, time_us: int, last: tuple[int, int]) -> int:
 def _name_field(preset: str) -> bytes:
     if not preset or len(preset) > 12 or not all(c in "abcdefghijklmnopqrstuvwxyz0123456789_-" for c in preset):
         raise UnoParameterError(f"a preset's name is 1 to 12 of a-z, 0-9, _ and -, not {preset!r}")
-    return frames.encode_name(preset)
+    return preset.encode()
 
 
 def _milliseconds(time_s: float) -> int:

@@ -82,8 +82,8 @@ class WildHost:
         if kind < 0.9:
             return self._upload()
         if kind < 0.97:
-            return [("load", (frames.encode_name(chance.choice(list(PRESETS))),))]
-        return [("save", (frames.encode_name("wild"),))]
+            return [("load", (chance.choice(list(PRESETS)).encode(),))]
+        return [("save", (b"wild",))]
 
     def _hold(self) -> tuple[int, int]:
         return self._chance.randrange(3), self._chance.randrange(3)

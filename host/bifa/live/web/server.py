@@ -251,7 +251,7 @@ class LivePage:
         rest is left alone."""
         moves = self.state.content["robot"] in MOVING
         if self._is_left and moves and self.state.content["stops_when_closed"]:
-            self.pilot.stop("the last page was closed").add_done_callback(_ignore_result)
+            self.pilot.stop("the last page was closed")
 
     # -- asking -----------------------------------------------------------------------------------------------
 
@@ -271,10 +271,8 @@ class LivePage:
 
     def _dispatch(self, page: OpenPage, number: Any, name: str, asked: Mapping[str, Any]) -> None:
         actions: dict[str, Callable[[], Awaitable[str] | str]] = {
-            "run": lambda: _reply_when_done(self.pilot.ask(lambda uno: uno.run()), "walking"),
-            "clear": lambda: _reply_when_done(
-                self.pilot.ask(lambda uno: uno.clear()), "released: the robot may walk again"
-            ),
+            "run": lambda: _reply_when_done(self.pilot.ask(Uno.run), "walking"),
+            "clear": lambda: _reply_when_done(self.pilot.ask(Uno.clear), "released: the robot may walk again"),
             "apply": lambda: self._upload(_gait(asked)),
             "save": lambda: self._upload(_gait(asked), str(asked.get("preset", ""))),
             "load": lambda: self._load(str(asked.get("preset", ""))),
@@ -361,12 +359,6 @@ async def _reply_when_done(future: Future[Any], said: str) -> str:
     carried out later without the page's knowledge."""
     await asyncio.wait_for(asyncio.wrap_future(future), _ANSWER_S)
     return said
-
-
-def _ignore_result(future: Future[Any]) -> None:
-    """Retrieve the exception of a future that nobody awaits; the pilot reports what went wrong."""
-    if not future.cancelled():
-        future.exception()
 
 
 def _gait(asked: Mapping[str, Any]) -> Gait:
