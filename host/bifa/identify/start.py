@@ -126,7 +126,7 @@ def _rests(dataset: Dataset, actuator: str) -> np.ndarray:
     the measured pressures [psi] that hold it there; shape (n, 2)."""
     found = []
     for trial in dataset.of("step_response", actuator):
-        time_s = trial.time_s - trial.time_s[0]
+        time_s = trial.elapsed_s
         for end in (*(t for t in step_timeline(trial).time_s if t > 0.0), time_s[-1] + 1.0):
             last = np.flatnonzero(time_s < end - 1e-9)[-_SAMPLES:]
             x = trial.columns["displacement_mm"][last]

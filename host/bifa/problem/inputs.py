@@ -147,7 +147,8 @@ class PullInputs:
 
     @cached_property
     def sample_s(self) -> float:
-        return float(np.median(np.diff(self.pulled_s)))
+        steps = np.diff(self.pulled_s)  # 0 while the puller rests
+        return float(np.median(steps) or np.median(steps[steps > 0.0]))
 
     @property
     def bench(self) -> Hashable:

@@ -227,6 +227,14 @@ def test_a_dead_channel_of_the_testing_machine_is_named_with_its_file(dataset, e
         prepare(replace(dataset, trials=trials))
 
 
+def test_a_pull_may_be_held_for_longer_than_it_lasts(dataset):
+    pull = dataset.of("anchor_pull")[0]
+    held, sample_s = len(pull.time_s) + 10, float(np.median(np.diff(pull.time_s)))
+    columns = {name: np.append(values, np.full(held, values[-1])) for name, values in pull.columns.items()}
+    columns["time_s"][-held:] += sample_s * np.arange(1, held + 1)
+    assert inputs_of(replace(pull, columns=columns)).sample_s == pytest.approx(sample_s, rel=0.1)
+
+
 def test_knowledge_of_what_the_model_does_not_have_is_refused(dataset):
     with pytest.raises(ModelParameterError, match="colour"):
         prepare(replace(dataset, known=dataset.known | {"colour": 3.0}))
