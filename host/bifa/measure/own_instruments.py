@@ -84,8 +84,11 @@ class OwnInstruments:
 
     def start(self) -> None:
         """See Instruments."""
-        self._known, self._reported = dict(self._signatures()), dict(self._incomplete_files())
-        self._before = dict(self._known)
+        self._before = {}
+        for path in self._files():
+            with contextlib.suppress(FileNotFoundError):  # deleted meanwhile
+                self._before[path] = _signature(path)
+        self._known, self._reported = {}, dict(self._before)
         machine = ROLES[self._experiment] == MACHINE  # a testing machine, which moves and measures, not a camera
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
         self._ask(
@@ -176,7 +179,8 @@ class OwnInstruments:
         return sorted(path for path in found if not is_stray(path.name) and path.is_file())
 
     def _signatures(self) -> Iterator[tuple[Path, Signature]]:
-        """Complete records: files whose sync file, if needed, exists as well."""
+        """Complete records: files whose sync file, if needed, exists as well. Those that were there at the start are
+        not this trial's, however they are declared now."""
         for path in self._files():
             if not _is_sync(path) and path.suffix.lower() in self._suffixes:
                 sync = sync_file(path)
@@ -184,7 +188,9 @@ class OwnInstruments:
                     continue
                 with contextlib.suppress(FileNotFoundError):  # deleted meanwhile
                     parts = (path, sync) if self._needs_sync_file else (path,)
-                    yield path, tuple(_signature(part) for part in parts)
+                    found = tuple(map(_signature, parts))
+                    if found != tuple(map(self._before.get, parts)):
+                        yield path, found
 
     def _incomplete_files(self) -> Iterator[tuple[Path, Signature]]:
         """Files that are not, or not yet, part of a complete record."""
@@ -249,7 +255,7 @@ class OwnInstruments:
                 self._desk.say(f"{error}.")
             return
         if declared != self._declared:
-            self._declared, self._known = declared, dict(self._before)
+            self._declared, self._known = declared, {}
 
     def _take_named(self, answer: str) -> bool:
         if not answer and self._watch is not None:

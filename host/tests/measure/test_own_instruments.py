@@ -68,9 +68,11 @@ SYNC = "sync_time_s\n" + "".join(f"{0.01 * k:.2f}\n" for k in range(100))
 def watching(said, tmp_path):
     """A function that returns instruments waiting for a pull's record, declared as given, and the watched folder."""
 
-    def begin(declaration=""):
+    def begin(declaration="", **there):
         folder = tmp_path / "records"
         folder.mkdir()
+        for name, content in there.items():
+            (folder / name.replace("_", ".")).write_bytes(content)
         (tmp_path / "bench.toml").write_text(declaration)
         own = OwnInstruments(Typing(said.append), folder, partial(read_exports, tmp_path / "bench.toml"))
         recorded(own, tmp_path / "raw")
@@ -187,3 +189,14 @@ def test_a_declaration_may_be_put_right_while_its_file_waits(watching, said, tmp
     assert looked(own, lambda: "'testexpert' is unknown" in said[-1])
     (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
     assert looked(own), said
+
+
+def test_a_file_that_was_there_at_the_start_is_no_record_however_it_is_declared_later(watching, said, tmp_path):
+    old = EXPORTS["testxpert"].write(RECORD | {"force_N": RECORD["force_N"] + 100.0})
+    own, folder = watching(first_TRA=old, first_sync_csv=SYNC.encode())
+    (folder / "second.TRA").write_bytes(EXPORTS["testxpert"].write(RECORD))
+    (folder / "second.sync.csv").write_text(SYNC)
+    assert looked(own, lambda: said)
+    (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
+    assert looked(own, seconds=PATIENCE_S), said
+    np.testing.assert_allclose(own.stop()["force_N"], RECORD["force_N"], atol=2e-3)
