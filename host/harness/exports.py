@@ -201,5 +201,5 @@ def write_export(folder: Path, name: str, columns: Columns) -> Path:
 
 def declarations(text: str, file: str = "bench.toml") -> dict[str, Export]:
     """The exports that a bench file of this text declares, by role."""
-    source, tables = Source(text, 0, file), parse_toml(text).get("instrument", {})
-    return parse_exports(Fields(tables if isinstance(tables, dict) else {}, source, table="instrument"), source)
+    tables = parse_toml(text).get("instrument", {})
+    return parse_exports(Fields(tables if isinstance(tables, dict) else {}, Source(text, 0, file), table="instrument"))

@@ -43,7 +43,7 @@ def _saturated_pressure(trial: Trial) -> Iterator[Finding]:
     for name, values in _columns(trial, "pressure"):
         rows = np.flatnonzero((values <= low) | (values >= high))
         if rows.size:
-            text = f"{rows.size} samples at the ADC's limit of {high:g} psi: saturated, or the sensor is broken"
+            text = f"{rows.size} samples at the ADC's limit of +-{high:g} psi: saturated, or the sensor is broken"
             yield Finding("saturated", text, trial.file, trial.line(rows[0]), name)
             continue
         rows = np.flatnonzero(np.abs(values) > SENSOR_SPAN_PSI)

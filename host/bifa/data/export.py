@@ -126,7 +126,8 @@ def read_columns(
     rows = _rows(sheet, export)
     there = [name for name in optional if name in export.columns or name in sheet.labels()]
     columns = {name: _column(sheet, export, name, rows) for name in (*wanted, *there)}
-    filled = np.flatnonzero(np.any([~np.isnan(values) for values in columns.values()], axis=0))
+    read = [values for name, values in columns.items() if export.columns.get(name) != _ROW_NUMBER]
+    filled = np.flatnonzero(np.any([~np.isnan(values) for values in read], axis=0))
     count = filled[-1] + 1 if len(filled) else 0
     return {name: values[:count] for name, values in columns.items()}, rows[:count]
 
@@ -176,7 +177,7 @@ def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.nda
     if unit == DATE:
         moments = _moments(sheet, export, source, rows)
         _refuse_midnight(sheet, moments, rows, source)
-        return _seconds(moments, moments)
+        return np.append(_seconds(moments, moments), np.full(len(rows) - len(moments), np.nan))
     if source == _ROW_NUMBER:
         values = rows.astype(float)
     else:
@@ -191,11 +192,14 @@ def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.nda
 
 
 def _moments(sheet: Sheet, export: Export, source: str, rows: np.ndarray) -> list[datetime]:
-    """Dates in `rows` of one column, or of several that together form one date ("Date + Time")."""
-    zone, moments = _zone(export.zone) if export.zone else None, []
+    """Dates in `rows` of one column, or of several that together form one date ("Date + Time"), without empty cells at
+    the end."""
+    zone, moments = ZoneInfo(export.zone) if export.zone else None, []
     parts = [sheet.cells(sheet.find(part)) for part in source.split(" + ")]
-    for row in rows:
-        cell = " ".join(part[row] for part in parts)
+    cells = [" ".join(part[row] for part in parts) for row in rows]
+    while cells and not cells[-1].strip():
+        cells.pop()
+    for row, cell in zip(rows, cells, strict=False):
         try:
             moments.append(_moment(cell, export.date_format, zone))
         except ValueError:
@@ -229,14 +233,6 @@ def _moment(cell: str, form: str | None, zone: ZoneInfo | None) -> datetime:
         except ValueError:  # whole seconds are often written without a fraction
             moment = datetime.strptime(text, _FRACTION.sub("", form))
     return (moment if moment.tzinfo else moment.replace(tzinfo=zone or UTC)).astimezone(UTC)
-
-
-def _zone(name: str) -> ZoneInfo:
-    """Return the time zone of this name; raises ValueError if it is unknown."""
-    try:
-        return ZoneInfo(name)
-    except (ZoneInfoNotFoundError, OSError) as error:
-        raise ValueError(f"unknown time zone {name!r}: write it as Europe/Berlin, or UTC") from error
 
 
 def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:
@@ -304,9 +300,11 @@ def parse_export(fields: Fields, name: str) -> Export:
         raise fields.error("date_format", "%p (AM or PM) counts only beside %I: write %I instead of %H")
     try:
         if export.zone:
-            _zone(export.zone)
-    except ValueError as error:
+            ZoneInfo(export.zone)
+    except ValueError as error:  # a path
         raise fields.error("zone", str(error)) from None
+    except (ZoneInfoNotFoundError, OSError):
+        raise fields.error("zone", f"unknown time zone {export.zone!r}: write it as Europe/Berlin, or UTC") from None
     _check_columns(fields, export)
     return export
 
@@ -390,12 +388,12 @@ def presets() -> dict[str, dict[str, Any]]:
     return dict(sorted(found.items()))
 
 
-def parse_exports(fields: Fields, source: Any) -> dict[str, Export]:
+def parse_exports(fields: Fields) -> dict[str, Export]:
     """Parse the tables [instrument.machine] and [instrument.camera]; the result is keyed by "machine" and "camera"."""
     declared = {}
     for role in (MACHINE, CAMERA):
         if role in fields:
-            declared[role] = parse_export(Fields(fields.take(role), source, table=f"instrument.{role}"), role)
+            declared[role] = parse_export(fields.inner(role, fields.take(role)), role)
     for name in fields.remaining():
         raise fields.error(
             name, f"must be {MACHINE} (static loadings, pulls) or {CAMERA} (steps, walks), by whose files they are"

@@ -140,7 +140,7 @@ class Fields:
 
     def inner(self, key: str, values: Any) -> Fields:
         """Return `Fields` for the table `values` under `key`."""
-        return Fields(values, self._source, self._trial, key)
+        return Fields(values, self._source, self._trial, ".".join(filter(None, (self._table, key))))
 
     def completed(self, defaults: Mapping[str, Any]) -> Fields:
         """Return the keys not yet read, with `defaults` for missing ones; nested tables are completed likewise."""

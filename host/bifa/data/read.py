@@ -57,7 +57,7 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     if not isinstance(listed, list) or not listed:
         raise top.error("trial", "must be a list of [[trial]] tables with at least one")
     instruments = top.inner("instrument", top.take("instrument") if "instrument" in top else {})
-    exports = parse_exports(instruments, source)
+    exports = parse_exports(instruments)
     top.finish(also=("known", "provenance", "instrument"))
     entries = [Fields(entry, source, trial=number) for number, entry in enumerate(listed, start=1)]
     heads = [_trial_head(fields) for fields in entries]
@@ -174,7 +174,7 @@ def _trial_head(fields: Fields) -> dict[str, Any]:
         if key in SETTINGS:
             raise fields.error("extra", f"{key} is a key of the trial itself and does not belong in extra")
     notes = fields.inner("extra", noted)
-    for key in NOTED.keys() & noted.keys():
+    for key in (key for key in NOTED if key in noted):
         notes.number(key, *NOTED[key])
     fields.finish(also=(*layout.optional, "session_order", "extra"))
     return {**head, "extra": {**noted, **extra}}

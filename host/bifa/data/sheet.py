@@ -237,10 +237,10 @@ class Sheet:
     def _refuse_other_separator(self) -> None:
         """Refuse a single column name that contains another separator: the declared separator is wrong."""
         if self._form.separator != " " and self._form.format == "csv" and len(self.names) == 1 and self.names[0]:
-            for mark in set(_NAMES_OF) - {" ", self._form.separator}:
-                if mark in self.names[0][0]:
+            for mark, called in _NAMES_OF.items():
+                if mark not in (" ", self._form.separator) and mark in self.names[0][0]:
                     raise self._error(
-                        f"its columns are separated by {_NAMES_OF[mark]}; save it with commas between columns, points "
+                        f"its columns are separated by {called}; save it with commas between columns, points "
                         "in numbers, or declare how it is written (bifa instrument)",
                         self.first - 1,
                     )

@@ -63,8 +63,7 @@ def read_exports(path: Path) -> dict[str, Export]:
     if not path.exists():
         return {}
     document, text = _read(path)
-    source = Source(text, 0, str(path))
-    return parse_exports(Fields(document.get("instrument", {}), source, table="instrument"), source)
+    return parse_exports(Fields(document.get("instrument", {}), Source(text, 0, str(path)), table="instrument"))
 
 
 def read_bench(path: Path) -> dict[str, float]:

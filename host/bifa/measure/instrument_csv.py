@@ -129,7 +129,7 @@ def read_instrument(
         del columns[_TAIL]
     _refuse_gaps(columns, sheet, rows, columns, _LOST)
     _refuse_falling(columns, sheet, rows, "time_s")
-    for name in columns.keys() - {"time_s"}:
+    for name in (name for name in columns if name != "time_s"):
         called = (export or OWN_NAMES).columns.get(name, name)
         written = sheet.numbers(sheet.find(called), called, rows)  # in the file's unit: in mm, -999 m is not a code
         if (coded := codes(written) & (np.abs(columns[name]) > _MAX_PLAUSIBLE)).any():

@@ -100,8 +100,7 @@ def declaration(role: str, table: Mapping[str, Any]) -> str:
 
 def parsed(role: str, table: Mapping[str, Any]) -> Export:
     """Return the checked declaration. Raises DatasetError if it is invalid."""
-    source = Source("", 0, "the declaration")
-    return parse_exports(Fields({role: dict(table)}, source, table="instrument"), source)[role]
+    return parse_exports(Fields({role: dict(table)}, Source("", 0, "the declaration"), table="instrument"))[role]
 
 
 # -- how it is written -----------------------------------------------------------------------------------------------

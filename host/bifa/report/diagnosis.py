@@ -119,8 +119,8 @@ def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any]
             if mine is not None:
                 value, (low, high) = quantity(mine["parameters"][key], unit, 3), mine["interval_90"][key]
                 ends = "" if None in (low, high) else f"{quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
-            row = [f"{effect_words(name)}: {meaning}", value, ends]
-            rows.append(row + ([quantity(true[key], unit, 3) if key in true else "absent"] if truth else []))
+            sealed = quantity(true[key], unit, 3) if key in true else "absent"
+            rows.append([f"{effect_words(name)}: {meaning}", value, ends, *([sealed] if truth is not None else [])])
     columns = ["", "found", "90 % interval", *(["sealed value"] if truth is not None else [])]
     return PageTable(columns, rows or [["no effect", *[""] * (len(columns) - 1)]])
 

@@ -201,6 +201,16 @@ READ = {
         named("t [1]"),
         [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
     ),
+    "a run of dates that ends before its neighbor": (
+        "t,x,F,,t\n2026-11-25T10:00:00,1,2,,9\n2026-11-25T10:00:01,2,3,,9\n,,,,9\n",
+        named("t [1]").replace('time_s = "s"', 'time_s = "date"'),
+        [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
+    ),
+    "a run of counted rows that ends before its neighbor": (
+        "t,x,F,,t\n,1,2,,9\n,2,3,,9\n,,,,9\n",
+        COUNTED,
+        [[0.0, 0.02], [1.0, 2.0], [2.0, 3.0]],
+    ),
     "lost at the first and the last row": (
         "t,x,F\n0,,\n1,2,3\n2,,\n",
         SIMPLE,
@@ -426,7 +436,7 @@ def test_an_export_that_states_another_rate_or_unit_than_its_preset_is_refused(
     ],
 )
 def test_a_declaration_that_is_wrong_is_named_by_line_and_key(text, said):
-    with pytest.raises(DatasetError, match=rf"bench\.toml, .*{said}"):
+    with pytest.raises(DatasetError, match=rf"bench\.toml, (?=line \d+, ).*{said}"):
         declared(text)
 
 
