@@ -27,7 +27,6 @@ from bifa.identify.doubts import with_doubts
 from bifa.identify.identification import identify
 from bifa.identify.start import prepare
 from bifa.measure import plan
-from bifa.measure.bench_file import known_of
 from bifa.measure.session import run_session
 from bifa.report.words import spoken
 from bifa.robot import Model, load_model, save_model
@@ -82,7 +81,7 @@ def _characterize(setup: Setup, effort: Effort, on_trial: OnProgress) -> list[St
                 outputs / data,
                 trials,
                 name="campaign" if kept else BENCH_NAME,
-                known=known_of(rig, known),
+                known={**rig.known, **known},
                 provenance=setup.settings(0) | day,
                 record=setup.hands,
                 on_event=lambda e: on_trial(e.planned.title, (e.number - 1 + e.share) / e.total),

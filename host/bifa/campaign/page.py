@@ -27,14 +27,7 @@ from bifa.report.diagnosis import (
     settings_words,
     verdict_sentence,
 )
-from bifa.report.evidence import (
-    BASE,
-    COMPLETED,
-    errors_chart,
-    residual_charts,
-    robustness_chart,
-    standing_share,
-)
+from bifa.report.evidence import BASE, COMPLETED, errors_chart, residual_charts, robustness_chart
 from bifa.report.page import ChartedSection, Motion, Page, PageTable
 from bifa.report.walks import MEASURED, Walk, walks_chart
 from bifa.report.words import NBSP, channel_words, effect_words, gait_words, plain, spoken, unit_of
@@ -173,7 +166,7 @@ def motion_of(walk: Walk, standalone: bool = False) -> tuple[str, float, float]:
     for name in (BASE, MEASURED, COMPLETED):
         miss = "" if name == MEASURED else f", {_ahead(_miss_mm(walk, name))} at the end"
         lanes[f"{name}{miss}"] = walk.records[name]
-    duration_s = float(walk.first["time_s"][-1] - walk.first["time_s"][0])
+    duration_s = float(np.ptp(walk.records[MEASURED]["time_s"]))
     seconds = min(duration_s, _LONGEST_S)
     title = f"Side view of the robot walking: {', '.join(lanes)}"
     return animate_walks(lanes, round(seconds, 2), title, standalone), round(seconds, 2), duration_s / seconds
@@ -192,7 +185,7 @@ def _ahead(miss_mm: float) -> str:
 
 def _gaits_section(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSection:
     robots = len(next(iter(summary["robustness"].values())))
-    standing = {name: standing_share(speeds) for name, speeds in summary["robustness"].items()}
+    standing = {name: np.mean(np.asarray(speeds) < STANDING_MM_S) for name, speeds in summary["robustness"].items()}
     said = [
         "The commands of each gait to the three chambers (filled: positive supply; blank: vacuum), the resulting "
         "pressures and the displacement of the head, over the same time for every gait.",

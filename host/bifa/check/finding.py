@@ -33,29 +33,21 @@ class Finding:
         return f"{where}: {self.text}" if where else self.text
 
 
-@dataclass(frozen=True)
-class MergedFinding:
-    """Merged findings: the `text` shown to the user, and the `places` of the findings (empty for a single one)."""
-
-    kind: str
-    text: str
-    places: tuple[str, ...] = ()
-
-
-def merge_findings(findings: Sequence[Finding]) -> Iterator[MergedFinding]:
-    """Merge findings that differ only in numbers and place; yields them in order of first appearance."""
+def merge_findings(findings: Sequence[Finding]) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Merge findings that differ only in numbers and place. Yields kind, text and places (none for a single finding) in
+    order of first appearance."""
     alike: dict[tuple[str, str | None, str], list[Finding]] = {}
     for finding in findings:
         alike.setdefault((finding.kind, finding.column, _NUMBER.sub("", finding.text)), []).append(finding)
     for group in alike.values():
         if len(group) < MIN_MERGED or not all(finding.place for finding in group):
-            yield from (MergedFinding(finding.kind, str(finding)) for finding in group)
+            yield from ((finding.kind, str(finding), ()) for finding in group)
             continue
         column = f", {group[0].column}" if group[0].column else ""
         count = len({finding.file or finding.condition for finding in group})
         what = f"{count} {'trials' if group[0].file else 'conditions'}{column}"
         text = f"{what}: {_merge_texts([finding.text for finding in group])}"
-        yield MergedFinding(group[0].kind, text, tuple(finding.place for finding in group))
+        yield group[0].kind, text, tuple(finding.place for finding in group)
 
 
 def _merge_texts(texts: Sequence[str]) -> str:

@@ -65,8 +65,10 @@ def check_strokes(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[F
         if found:
             strokes[actuator] = float(np.median(found))
     for trial in dataset.trials:
-        shown, column = _observed_actuator(trial)
-        if shown is None or shown not in strokes or trial.file in skipped:
+        # without a tracked tail a walk shows no length
+        walk = "displacement_tail_mm" in trial.columns
+        shown = "large" if walk else trial.actuator if trial.experiment == "step_response" else None
+        if shown not in strokes or trial.file in skipped:
             continue
         seen_mm = length_mm(trial)
         moved_mm = float(np.ptp(seen_mm))
@@ -76,16 +78,7 @@ def check_strokes(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[F
                 f"moves by {moved_mm:.3g} mm, but by {strokes[shown]:.3g} mm in the testing machine"
                 f"{_suggest_unit(moved_mm, 1.2 * strokes[shown], _MM)}"
             )
-            yield Finding("unit", text, trial.file, column=column)
-
-
-def _observed_actuator(trial: Trial) -> tuple[str | None, str]:
-    """The actuator whose length a camera saw, and the column. Without a tracked tail a walk shows no length."""
-    if trial.experiment == "step_response":
-        return trial.actuator, "displacement_mm"
-    if trial.experiment == "locomotion" and "displacement_tail_mm" in trial.columns:
-        return "large", "displacement_head_mm"
-    return None, ""
+            yield Finding("unit", text, trial.file, column="displacement_head_mm" if walk else "displacement_mm")
 
 
 def _snaps(time_s: np.ndarray, seen_mm: np.ndarray) -> bool:

@@ -63,10 +63,10 @@ def warn_of_findings(console: Console, dataset: "Dataset") -> None:
 def _print_findings(console: Console, findings: "Sequence[Finding]") -> None:
     from bifa.check.finding import merge_findings
 
-    for found in merge_findings(findings):
-        console.print(warning(f"[{found.kind}] {found.text}"))
-        if found.places:
-            console.print(f"  {'; '.join(found.places)}")
+    for kind, text, places in merge_findings(findings):
+        console.print(warning(f"[{kind}] {text}"))
+        if places:
+            console.print(f"  {'; '.join(places)}")
 
 
 def _print_contents(console: Console, dataset: "Dataset") -> None:

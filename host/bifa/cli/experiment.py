@@ -186,7 +186,6 @@ def _run(
 ) -> None:
 
     from bifa.cli.campaign import at_desk
-    from bifa.measure.bench_file import known_of
     from bifa.measure.session import provenance, run_session
     from bifa.rig import open_rig
 
@@ -216,7 +215,7 @@ def _run(
                 out,
                 trials,
                 name=f"{name} on the bench",
-                known=known_of(rig, known),
+                known={**rig.known, **known},
                 provenance=provenance("bifa experiment", port, options | ({"cycles": cycles} if cycles else {})),
                 record=hands,
                 on_event=on_event,

@@ -69,7 +69,7 @@ def _make(console: Console, model_path: Path | None, folder: Path, names: list[s
     model = load_model(model_path) if model_path else nominal()
     folder.mkdir(parents=True, exist_ok=True)
     with simulations() as runs, search_progress(console) as progress:
-        for scenario in map(scenarios.load_scenario, names):
+        for scenario in map(scenarios.SCENARIOS.__getitem__, names):
             settings = replace(scenario.settings, seed=seed)
             optimum = optimize(model, runs, settings, progress(scenario.name))
             path = scenarios.save(folder, scenario, optimum, model.name)

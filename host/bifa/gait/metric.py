@@ -67,16 +67,12 @@ class Metric:
     settled: float = _SETTLED
     looser: float = _LOOSER
     single: bool = True
+    terrain = CLEAR  # not a field: no obstacles
 
     @property
     def is_plain(self) -> bool:
         """Whether the metric is for walking forward through a level pipe."""
         return self.direction == 1 and self.inclination_deg == 0.0
-
-    @property
-    def terrain(self) -> np.ndarray:
-        """No obstacles."""
-        return CLEAR
 
     def finer(self) -> "Metric":
         """Return the metric for finalists: twenty cycles, all simulated and the last ten judged, and a far smaller
@@ -126,16 +122,12 @@ class Passage:
     dead_time_s: float = 0.0
     looser: float = _LOOSER
     single: bool = True
+    settled = 0.0  # not a field: no walk ends early
 
     @property
     def terrain(self) -> np.ndarray:
         """The tunnel, 10 cm ahead of the head."""
         return terrain(tunnel())
-
-    @property
-    def settled(self) -> float:
-        """No walk ends early."""
-        return 0.0
 
     def finer(self) -> "Passage":
         """Return the metric for finalists: a smaller step, in double precision."""

@@ -113,11 +113,6 @@ class Settings:
         """The metric that applies: a robust search judges the model itself by the rules for drawn robots."""
         return self.metric.of_draws() if self.robust else self.metric
 
-    def knowledge(self, model: Model) -> Knowledge:
-        """Return the distribution that robots are drawn from."""
-        known = spread_of(model, self.spread)
-        return known.naive if self.naive else known
-
 
 @dataclass(frozen=True)
 class Optimum:
@@ -212,7 +207,8 @@ def optimize(
     if settings.method not in METHODS:
         raise SearchError(f"method {settings.method!r} is not one of {', '.join(METHODS)}")
     started = runs.count
-    known = settings.knowledge(model)
+    known = spread_of(model, settings.spread)
+    known = known.naive if settings.naive else known
     timing = known.scatter
     metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s)
     if not settles(model):

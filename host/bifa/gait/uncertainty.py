@@ -154,7 +154,7 @@ class _Draws:
     def __init__(self, model: Model, names: Sequence[str]):
         self._model, self._values = model, model.values
         self._plain = [(k, name) for k, name in enumerate(names) if name in self._values]
-        self._springs = [_SpringDraws(model.stiffness(curve), _members(names, curve)) for curve in STIFFNESS]
+        self._springs = [_SpringDraws(getattr(model, curve), _members(names, curve)) for curve in STIFFNESS]
         self._curves = {
             site: _LearntCurveDraws(curve, _members(names, f"{LEARNT}.{site}")) for site, curve in model.learnt.items()
         }

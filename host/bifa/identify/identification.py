@@ -11,7 +11,7 @@ import numpy as np
 from bifa.data import Dataset
 from bifa.identify.completed import described
 from bifa.identify.start import fit_statics, prepare
-from bifa.identify.static import IntervalEstimate, StaticFit
+from bifa.identify.static import StaticFit
 from bifa.problem.inputs import ANCHOR
 from bifa.problem.system import CURVE_OF, PIPE, RobotSystem
 from bifa.robot import Model
@@ -19,13 +19,7 @@ from lacuna.estimation.fit import Fit, fit_base, rms_by_channel
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.settle import settle
 from lacuna.estimation.solve import one_thread, solve
-from lacuna.estimation.uncertainty import (
-    CONFIDENCE,
-    Uncertainty,
-    clustered_covariance,
-    profile_interval,
-    uncertainty,
-)
+from lacuna.estimation.uncertainty import CONFIDENCE, Uncertainty, clustered_covariance, profile_interval, uncertainty
 
 _NORMAL_HALF = round(NormalDist().inv_cdf(0.5 + CONFIDENCE / 2), 4)  # half-width in standard deviations
 # mu_s shows in a single sample of each pull, the breakaway, so its cost is not quadratic.
@@ -56,6 +50,16 @@ class Open:
     name: str
     value: float
     needs: str
+
+
+@dataclass(frozen=True)
+class IntervalEstimate:
+    """`value` with its standard deviation `sd` and its interval `lower` to `upper` at level `CONFIDENCE`."""
+
+    value: float
+    sd: float
+    lower: float
+    upper: float
 
 
 @dataclass(frozen=True)

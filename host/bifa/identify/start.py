@@ -70,7 +70,7 @@ def _areas(statics: Mapping[str, StaticFit], model: Model) -> dict[str, float]:
     found = {}
     for actuator, fit in statics.items():
         if fit.area_N_psi is not None:
-            parameter, area = model.parameters[f"{CURVE_OF[actuator]}_area_N_psi"], fit.area_N_psi.value
+            parameter, area = model.parameters[f"{CURVE_OF[actuator]}_area_N_psi"], fit.area_N_psi
             try:
                 found[parameter.name] = parameter.with_value(area).value
             except ModelParameterError as error:

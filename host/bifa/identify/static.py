@@ -5,24 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
 from bifa.data import Dataset, Trial
 from bifa.problem.motion import imposed_motion
 from bifa.problem.stiffness import StiffnessFit, UndeterminedError, fit_stiffness
-from lacuna.estimation.uncertainty import CONFIDENCE
 
 UNPRESSURISED_PSI = 0.05  # below this commanded pressure a trial counts as one at 0 psi
-
-
-@dataclass(frozen=True)
-class IntervalEstimate:
-    """`value` with its standard deviation `sd` and its interval `lower` to `upper` at level `CONFIDENCE`."""
-
-    value: float
-    sd: float
-    lower: float
-    upper: float
 
 
 @dataclass(frozen=True)
@@ -32,7 +20,7 @@ class StaticFit:
 
     actuator: str
     stiffness: StiffnessFit
-    area_N_psi: IntervalEstimate | None
+    area_N_psi: float | None
     hysteresis_N: float
 
 
@@ -60,33 +48,14 @@ def _branches(trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return motion.displacement_m[moving], trial.columns["force_N"][moving], motion.direction[moving] > 0
 
 
-def _area(stiffness: StiffnessFit, trials: list[Trial]) -> IntervalEstimate:
+def _area(stiffness: StiffnessFit, trials: list[Trial]) -> float:
     """Each trial gives one area, the mean of (K(x) - F) / p; higher pressures have more weight."""
     areas, weights = [], []
     for trial in trials:
         x, force, _ = _branches(trial)
         areas.append(np.mean(stiffness.force(x) - force) / trial.commanded_psi)
         weights.append(trial.commanded_psi**2)
-    # The uncertainty of K's mean shifts every trial alike, so it does not show in their scatter.
-    x = np.linspace(*stiffness.covered_m, 50)
-    mean_pressure = np.average([trial.commanded_psi for trial in trials], weights=weights)
-    common_sd = stiffness.mean_force_sd(x) / abs(mean_pressure)
-    return _weighted_mean(np.array(areas), np.array(weights), common_sd)
-
-
-def _weighted_mean(values: np.ndarray, weights: np.ndarray, common_sd: float) -> IntervalEstimate:
-    """Mean of measurements with variances proportional to 1/weights, with an interval from their scatter and
-    `common_sd`, an error that all share. Degrees of freedom by Welch and Satterthwaite. A single measurement has an
-    infinite interval, because its repeatability is unknown."""
-    mean = float(np.average(values, weights=weights))
-    n = len(values)
-    if n < 2:
-        return IntervalEstimate(mean, np.inf, -np.inf, np.inf)
-    scatter = float(np.sqrt(np.sum(weights * (values - mean) ** 2) / (n - 1) / weights.sum()))
-    sd = float(np.hypot(scatter, common_sd))
-    freedom = (n - 1) * (sd / scatter) ** 4 if scatter > 0 else np.inf
-    half = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * sd
-    return IntervalEstimate(mean, sd, mean - half, mean + half)
+    return float(np.average(areas, weights=weights))
 
 
 def _half_width(x: np.ndarray, force: np.ndarray, loading: np.ndarray, stiffness: StiffnessFit) -> float:

@@ -52,7 +52,6 @@ def record_walks(
 ) -> None:
     """Record `repeats` walks into the data set `out`; an interrupted session resumes where it stopped."""
     from bifa.gait.settling import MIN_CYCLES, Walking, measured_speed
-    from bifa.measure.bench_file import known_of
     from bifa.measure.plan import walks
     from bifa.measure.session import Event, provenance, run_session
 
@@ -78,7 +77,7 @@ def record_walks(
             out,
             walks(gait, repeats, cycles=cycles, name="walk"),
             name="walks",
-            known=known_of(rig, {}),
+            known=dict(rig.known),
             provenance=provenance("bifa record", port, {"cycles": cycles, **gait.parameters}),
             on_event=on_event,
         )

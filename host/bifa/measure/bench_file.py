@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import time
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,6 @@ from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
 from bifa.files import read_text, write_text
 from bifa.measure.desk import Desk
-from bifa.rig import Rig
 from bifa.robot.parameters import BASE_PARAMETERS, ModelParameterError
 from bifa.toml import parse_toml
 
@@ -135,8 +134,3 @@ def parse_known(given: Iterable[str]) -> dict[str, float]:
             raise ModelParameterError(f"{name} must be a number, not {value!r}") from None
         BASE_PARAMETERS[name].check(known[name])
     return known
-
-
-def known_of(rig: Rig, given: Mapping[str, float]) -> dict[str, float]:
-    """Return `[known]` of a data set recorded on `rig`: what the rig declares, overridden by what is `given`."""
-    return {**rig.known, **given}

@@ -12,14 +12,7 @@ import numpy as np
 from bifa import simulate
 from bifa.data import Trial
 from bifa.problem.motion import imposed_motion
-from bifa.problem.switches import (
-    seconds_per_uno_s,
-    shifted,
-    step_timeline,
-    switch_sd_s,
-    valves_of,
-    walk_timeline,
-)
+from bifa.problem.switches import seconds_per_uno_s, shifted, step_timeline, switch_sd_s, valves_of, walk_timeline
 from bifa.problem.unmeasured import LOAD_CELL
 from bifa.simulate import Plant, Timeline
 from bifa.simulate.records import SimulatedTrial

@@ -63,11 +63,6 @@ class StiffnessFit:
         """Covariance of the coefficients [N^2], shape (16, 16)."""
         return np.linalg.pinv(self.information, hermitian=True)
 
-    def mean_force_sd(self, x: np.ndarray) -> float:
-        """Standard deviation of the mean of K over the points x [N]."""
-        row = self._rows(x).mean(axis=0)
-        return float(np.sqrt(max(row @ self.covariance @ row, 0.0)))
-
     def unstable_m(self) -> float:
         """The unstable equilibrium (the threshold of eq. (3)), where K falls through 0 between the stable states.
         Raises UndeterminedError if there is none."""

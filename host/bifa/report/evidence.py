@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from bifa.gait.settling import STANDING_MM_S
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
 from bifa.report.words import channel_words, experiment_words
 
@@ -118,11 +117,6 @@ def _size(trace: Mapping[str, Any]) -> float:
 
 
 # -- robustness ---------------------------------------------------------------------------------------------------
-
-
-def standing_share(speeds: Sequence[float]) -> float:
-    """Share of robots that do not walk, 0 to 1."""
-    return float(np.mean(np.asarray(speeds) < STANDING_MM_S))
 
 
 def robustness_chart(speeds: Mapping[str, Sequence[float]], titles: Mapping[str, str]) -> Chart:

@@ -29,15 +29,10 @@ class Walk:
     period_s: float
     records: Mapping[str, Mapping[str, np.ndarray]]
 
-    @property
-    def first(self) -> Mapping[str, np.ndarray]:
-        """The record drawn solid."""
-        return next(iter(self.records.values()))
-
 
 def walks_chart(walks: Sequence[Walk]) -> Chart:
     """Plot all walks over equal times (that of the shortest record) and distances, so that faster ones look faster."""
-    horizon_s = min(float(walk.first["time_s"][-1]) for walk in walks)
+    horizon_s = min(float(next(iter(walk.records.values()))["time_s"][-1]) for walk in walks)
     records = [record for walk in walks for record in walk.records.values()]
     paths = np.concatenate([[0.0], *(_truncate(r, "displacement_head_mm", horizon_s)[1] for r in records)])
     margin = _MARGIN * max(float(np.ptp(paths)), 1.0)
@@ -71,7 +66,7 @@ def _column(
     outputs = [
         Series((chamber, first), x, row * _ROW + _BAR * np.nan_to_num(y), chamber, "area", base=row * _ROW)
         for row, chamber in enumerate(CHAMBERS)
-        for x, y in [edges(*_truncate(walk.first, f"command_{chamber}", horizon_s))]
+        for x, y in [edges(*_truncate(walk.records[first], f"command_{chamber}", horizon_s))]
     ]
     pressures, paths = [], []
     for name, record in walk.records.items():

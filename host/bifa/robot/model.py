@@ -120,17 +120,13 @@ class Model:
         try:
             if owner in STIFFNESS:
                 (power,) = map(_place, rest)
-                return float(self.stiffness(owner).coefficients[power])
+                return float(getattr(self, owner).coefficients[power])
             if owner == LEARNT:
                 site, row, place = rest
                 return float(self.learnt[site].values[_place(row), _place(place)])
             return self.effects[owner][".".join(rest)]
         except (KeyError, IndexError, ValueError):
             raise ModelParameterError(f"model {self.name!r} has no parameter {name!r}") from None
-
-    def stiffness(self, name: str) -> StiffnessCurve:
-        """One of the two curves, by its name in `STIFFNESS`."""
-        return self.body_stiffness if name == "body_stiffness" else self.small_stiffness
 
     @property
     def values(self) -> dict[str, float]:

@@ -70,23 +70,20 @@ def load_model(path: str | Path) -> Model:
 
 def save_model(path: str | Path, model: Model) -> None:
     """Write a model file, from which `load_model` restores the same numbers."""
-    document: dict[str, Any] = {"format": FORMAT, "name": model.name}
-    if model.provenance:
-        document["provenance"] = model.provenance
-    document["parameters"] = {name: _entry(parameter) for name, parameter in model.parameters.items()}
-    document["stiffness"] = {"body": _curve(model.body_stiffness), "small": _curve(model.small_stiffness)}
-    if model.effects:
-        document["effects"] = {name: dict(values) for name, values in model.effects.items()}
-    if model.learnt:
-        document["learnt"] = {
+    known, scatter = model.covariance, model.scatter
+    document = {
+        "provenance": model.provenance,
+        "parameters": {name: _entry(parameter) for name, parameter in model.parameters.items()},
+        "stiffness": {"body": _curve(model.body_stiffness), "small": _curve(model.small_stiffness)},
+        "effects": {name: dict(values) for name, values in model.effects.items()},
+        "learnt": {
             name: {"lower": c.lower, "upper": c.upper, "values": c.values.tolist()} for name, c in model.learnt.items()
-        }
-    if model.covariance is not None:
-        covariance = model.covariance
-        document["covariance"] = {"names": list(covariance.names), "matrix": covariance.matrix.tolist()}
-    if model.scatter is not None:
-        document["scatter"] = asdict(model.scatter)
-    write_text(path, tomli_w.dumps(document))
+        },
+        "covariance": known and {"names": list(known.names), "matrix": known.matrix.tolist()},
+        "scatter": scatter and asdict(scatter),
+    }
+    filled = {key: value for key, value in document.items() if value}
+    write_text(path, tomli_w.dumps({"format": FORMAT, "name": model.name, **filled}))
 
 
 def _entry(parameter: ModelParameter) -> dict[str, Any]:

@@ -7,16 +7,7 @@ import numpy as np
 from bifa.simulate import layout
 from bifa.simulate.compiled import kernel, merged
 from bifa.simulate.march import march_through, new_run, shown, start_effects
-from bifa.simulate.stepper import (
-    STATES,
-    V_HEAD,
-    V_TAIL,
-    X_HEAD,
-    X_SMALL_HEAD,
-    X_SMALL_TAIL,
-    X_TAIL,
-    grip,
-)
+from bifa.simulate.stepper import STATES, V_HEAD, V_TAIL, X_HEAD, X_SMALL_HEAD, X_SMALL_TAIL, X_TAIL, grip
 from bifa.simulate.timeline import delayed
 
 # Columns of a record: the state y, the sensor readings, the normal forces (7), and the travel while both ends slid.

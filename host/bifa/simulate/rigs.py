@@ -42,17 +42,13 @@ def stand(plant: Plant, actuator: str, positive_psi: float) -> Mounting:
     """One actuator on a level stand, with its bigger end clamped."""
     if actuator not in ACTUATORS:
         raise SimulationError(f"actuator {actuator!r} is not one of {', '.join(ACTUATORS)}")
-    small = plant.q[layout.SMALL + layout.VOLUME]
-    parts = HAS_BODY if actuator == "large" else HAS_HEAD
-    shares, vacuum = np.array([1.0, small, small]), plant.q[layout.SUPPLY_NEGATIVE]
-    return Mounting(parts, 1, 0, 1.0, 0.0, _pressure(positive_psi), vacuum, shares, CLEAR)
+    small, parts = plant.q[layout.SMALL + layout.VOLUME], HAS_BODY if actuator == "large" else HAS_HEAD
+    return anchor(plant, positive_psi)._replace(parts=parts, wall=0, share=np.array([1.0, small, small]))
 
 
 def anchor(plant: Plant, pressure_psi: float) -> Mounting:
     """A head segment in the pipe."""
-    segment = _SMALL_ACTUATORS * plant.q[layout.SMALL + layout.VOLUME]
-    shares, vacuum = np.array([1.0, segment, segment]), plant.q[layout.SUPPLY_NEGATIVE]
-    return Mounting(HAS_HEAD, 1, 1, 1.0, 0.0, _pressure(pressure_psi), vacuum, shares, CLEAR)
+    return pipe(plant)._replace(parts=HAS_HEAD, free=1, positive_psi=_pressure(pressure_psi))
 
 
 def _pressure(value: float) -> float:

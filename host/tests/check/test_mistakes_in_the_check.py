@@ -61,19 +61,19 @@ def clipped(trial: int, psi: float) -> Finding:
 
 
 def test_numbers_that_differ_are_said_from_the_lowest_to_the_highest():
-    (found,) = merge_findings([clipped(1, 9.5), clipped(2, -10), clipped(3, 0.25)])
-    assert found.text == "3 trials, pressure_psi: -10 to 9.5 psi in 7 samples of pull-2.csv"
-    assert found.places == ("step_1.csv, line 11", "step_2.csv, line 12", "step_3.csv, line 13")
+    ((_, text, places),) = merge_findings([clipped(1, 9.5), clipped(2, -10), clipped(3, 0.25)])
+    assert text == "3 trials, pressure_psi: -10 to 9.5 psi in 7 samples of pull-2.csv"
+    assert places == ("step_1.csv, line 11", "step_2.csv, line 12", "step_3.csv, line 13")
 
 
 def test_a_few_are_said_one_by_one_and_so_is_what_concerns_the_whole_data_set():
     two = [clipped(1, 9.5), clipped(2, 10)]
-    assert [found.text for found in merge_findings(two)] == [str(finding) for finding in two]
-    assert [found.places for found in merge_findings([Finding("order", f"{n} of it") for n in (1, 2, 3)])] == [()] * 3
+    assert [text for _, text, _ in merge_findings(two)] == [str(finding) for finding in two]
+    assert [places for *_, places in merge_findings([Finding("order", f"{n} of it") for n in (1, 2, 3)])] == [()] * 3
 
 
 def test_conditions_that_lack_a_repeat_are_gathered():
     lonely = [Finding("missing repeats", "repeats 2, 3 are missing", condition=f"static, {n} psi") for n in (0, 2, 4)]
-    (found,) = merge_findings(lonely)
-    assert found.text == "3 conditions: repeats 2, 3 are missing"
-    assert found.places == ("static, 0 psi", "static, 2 psi", "static, 4 psi")
+    ((_, text, places),) = merge_findings(lonely)
+    assert text == "3 conditions: repeats 2, 3 are missing"
+    assert places == ("static, 0 psi", "static, 2 psi", "static, 4 psi")

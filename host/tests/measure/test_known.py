@@ -1,6 +1,5 @@
 """A data set's known values come only from the rig or the user."""
 
-from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
@@ -9,20 +8,13 @@ from bifa.link.units import set_point_psi
 from bifa.measure.bench_file import (
     BenchFileError,
     add_table,
-    known_of,
     load_or_ask_known,
     parse_known,
     read_bench,
     read_exports,
 )
-from bifa.rig import SerialRig, open_rig
+from bifa.rig import open_rig
 from bifa.robot.parameters import ModelParameterError
-
-
-def test_what_the_person_measured_comes_before_what_the_rig_declares_and_a_serial_port_declares_nothing():
-    assert known_of(SerialRig, {}) == {}
-    rig = SimpleNamespace(known={"head_mass_kg": 0.175, "tail_mass_kg": 0.175})
-    assert known_of(rig, parse_known(["head_mass_kg=0.182"])) == {"head_mass_kg": 0.182, "tail_mass_kg": 0.175}
 
 
 @pytest.mark.parametrize(
@@ -43,7 +35,7 @@ def test_what_cannot_be_known_is_refused(text, told):
 @pytest.mark.uno
 def test_the_virtual_lab_has_weighed_its_own_robot_and_read_its_gauge():
     with open_rig("virtual", parameters={"head_mass_kg": 0.2}) as rig:
-        assert known_of(rig, {}) == {
+        assert dict(rig.known) == {
             "head_mass_kg": 0.2,
             "tail_mass_kg": rig.truth["tail_mass_kg"],
             "supply_positive_psi": pytest.approx(set_point_psi(8.5), abs=1e-4),

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bifa.gait.library import NAMES, checked
+from bifa.gait.library import NAMES
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.search import Optimum, Settings
 from bifa.gait.space import paper_space
@@ -46,11 +46,6 @@ SCENARIOS: dict[str, Scenario] = {
 
 
 assert tuple(SCENARIOS) == NAMES
-
-
-def load_scenario(name: str) -> Scenario:
-    """Return the scenario called `name`. Raises LibraryError for an unknown one."""
-    return SCENARIOS[checked(name)]
 
 
 def provenance(optimum: Optimum, model_name: str, made_by: str) -> dict[str, Any]:
