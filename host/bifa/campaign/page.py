@@ -68,7 +68,7 @@ def campaign_page(
     walks: the first repeat of each gait, by the gait's name in the summary. robot: in words; made: date, command,
     versions.
     """
-    verdict = verdict_sentence(summary["verdict"], summary["effects"], summary["remainder"])
+    verdict = verdict_sentence(summary)
     sections = [
         _findings_section(summary, diagnosis),
         _residuals_section(summary, diagnosis, traces, labels),

@@ -87,7 +87,7 @@ def _read(name: str, folder: Path) -> Campaign:
 
 def compare_page(runs: Sequence[Campaign]) -> Page:
     """Build the page that compares the campaigns."""
-    verdicts = [f"{run.name}: {_verdict(run)}" for run in runs]
+    verdicts = [f"{run.name}: {verdict_sentence(run.summary)}" for run in runs]
     gaits = [gait_table(runs, which) for which in runs[0].gaits]
     marks = (
         "Parameters of the completed models; ≠ marks those that differ between two runs by more than their "
@@ -122,10 +122,6 @@ def _lead(runs: Sequence[Campaign]) -> str:
 
 def _names(effects: Iterable[str]) -> str:
     return " and ".join(effect_words(name) for name in sorted(effects))
-
-
-def _verdict(run: Campaign) -> str:
-    return verdict_sentence(run.summary["verdict"], run.summary["effects"], run.summary["remainder"])
 
 
 def _speed(run: Campaign, gait: str) -> float:

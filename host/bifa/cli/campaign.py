@@ -123,7 +123,7 @@ def _print_summary(console: Console, out: Path) -> None:
     summary = json.loads((out / "summary.json").read_text())
     verdict, effects = summary["verdict"], summary["effects"]
     named = "; ".join(effect_words(e["name"], e["parameters"]) for e in effects)
-    said = f", {plain_spaces(named)}" if named else f". {verdict_sentence(verdict, effects, summary['remainder'])}"
+    said = f", {plain_spaces(named)}" if named else f". {verdict_sentence(summary)}"
     console.print(Text.assemble("verdict: ", (verdict, "bold"), said))
     if summary["truth"] is not None:
         inside = "; ".join(effect_words(name, values) for name, values in summary["truth"].items())

@@ -200,6 +200,6 @@ def print_diagnosis(console: Console, record: dict[str, Any], labels: dict[str, 
     from bifa.report.terminal import print_lines, print_sections, print_table
 
     console.print(str(record["verdict"]), style="bold")
-    print_lines(console, [verdict_sentence(record["verdict"], record["effects"], record["remainder"])])
+    print_lines(console, [verdict_sentence(record)])
     print_table(console, noise_table(record["error"]))
     print_sections(console, [*lacking(record, labels), *further(record, labels)])

@@ -74,7 +74,6 @@ _YEAR_OF_TIMES = 1900  # of dates that name none, by strptime
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
 _ROW_NUMBER = "[0]"  # in place of a column: the number of the row, from 0
-_THRESHOLD = 2.5  # V, for a strobe of 5 V
 SLOWEST_SYNC_S = 0.002  # the strobe is high for 2.6 ms
 
 
@@ -97,7 +96,7 @@ class Export:
     date_format: str | None = None
     zone: str | None = None
     sync: str = _SYNC_FILE
-    threshold: float = _THRESHOLD
+    threshold: float = 2.5  # V, for a strobe of 5 V
 
     @property
     def needs_sync_file(self) -> bool:
@@ -284,17 +283,11 @@ def parse_export(fields: Fields, name: str) -> Export:
     if "preset" in fields:
         preset = presets()[fields.choice("preset", tuple(presets()))]
         fields = fields.completed({key: value for key, value in preset.items() if key in _KEYS})
-    sync, threshold = _sync(fields)
-    export = Export(
-        name,
-        _form(fields),
-        **{key: fields.table(key) for key in (*_TABLES, "where") if key in fields},
-        rate_hz=fields.number("rate_hz", 1e-3, 1e6) if "rate_hz" in fields else None,
-        date_format=fields.text("date_format") if "date_format" in fields else None,
-        zone=fields.text("zone") if "zone" in fields else None,
-        sync=sync,
-        threshold=threshold,
-    )
+    given, sheet = _sync(fields), _form(fields)
+    given |= {key: fields.table(key) for key in (*_TABLES, "where") if key in fields}
+    given |= {"rate_hz": fields.number("rate_hz", 1e-3, 1e6)} if "rate_hz" in fields else {}
+    given |= {key: fields.text(key) for key in ("date_format", "zone") if key in fields}
+    export = Export(name, sheet, **given)
     fields.finish(also=_KEYS)
     if "%p" in (form := export.date_format or "") and "%I" not in form:
         raise fields.error("date_format", "%p (AM or PM) counts only beside %I: write %I instead of %H")
@@ -309,17 +302,17 @@ def parse_export(fields: Fields, name: str) -> Export:
     return export
 
 
-def _sync(fields: Fields) -> tuple[str, float]:
+def _sync(fields: Fields) -> dict[str, Any]:
     given = fields.take("sync") if "sync" in fields else _SYNC_FILE
     if given in (_SYNC_FILE, _SYNC_FRAMES):
-        return given, _THRESHOLD
+        return {"sync": given}
     if not isinstance(given, dict):
         raise fields.error("sync", 'must be "file", "frames" or { column = "NAME", threshold = 2.5 }')
     strobe = fields.inner("sync", given)
-    column = strobe.text("column")
-    threshold = strobe.number("threshold") if "threshold" in strobe else _THRESHOLD
+    found: dict[str, Any] = {"sync": strobe.text("column")}
+    found |= {"threshold": strobe.number("threshold")} if "threshold" in strobe else {}
     strobe.finish(also=("threshold",))
-    return column, threshold
+    return found
 
 
 def _form(fields: Fields) -> SheetForm:

@@ -77,18 +77,19 @@ class Fields:
     def __contains__(self, key: str) -> bool:
         return key in self._values
 
-    def take(self, key: str) -> Any:
-        """Take the value of a required key, of any type."""
+    def take(self, key: str, kind: Any = object, called: str = "") -> Any:
+        """Take the value of a required key, of any type or of `kind`, which messages call `called`."""
         self._asked.append(key)
         if key not in self._values:
             raise self.error(key, "the key is missing")
-        return self._values.pop(key)
+        value = self._values.pop(key)
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not object):
+            raise self.error(key, f"must be {called}, not {_kind(value)}")
+        return value
 
     def text(self, key: str) -> str:
         """Take a string that is not empty and has no control characters."""
-        value = self.take(key)
-        if not isinstance(value, str):
-            raise self.error(key, f"must be a string, not {_kind(value)}")
+        value: str = self.take(key, str, "a string")
         if not value.strip() or not value.isprintable():
             raise self.error(key, "must be printable text that is not empty")
         return value
@@ -102,9 +103,7 @@ class Fields:
 
     def number(self, key: str, low: float = -math.inf, high: float = math.inf) -> float:
         """Take a finite number in [low, high]."""
-        value = self.take(key)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.error(key, f"must be a number, not {_kind(value)}")
+        value = self.take(key, int | float, "a number")
         try:
             number = float(value)
         except OverflowError:
@@ -124,18 +123,14 @@ class Fields:
 
     def whole(self, key: str, low: int, high: int = 2**31 - 1) -> int:
         """Take a whole number in [low, high]."""
-        value = self.take(key)
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise self.error(key, f"must be a whole number, not {_kind(value)}")
+        value: int = self.take(key, int, "a whole number")
         if not low <= value <= high:
             raise self.error(key, f"{value} is outside {low} to {high}")
         return value
 
     def table(self, key: str) -> dict[str, Any]:
         """Take a nested table, unparsed."""
-        value = self.take(key)
-        if not isinstance(value, dict):
-            raise self.error(key, f"must be a table, not {_kind(value)}")
+        value: dict[str, Any] = self.take(key, dict, "a table")
         return value
 
     def inner(self, key: str, values: Any) -> Fields:

@@ -91,13 +91,9 @@ class Sheet:
             raw = raw.replace(b"\r", b"\n")
         lines = (raw if self._form.above else raw[:_HEAD]).split(b"\n")  # other tables may be above the one declared
         texts = [line.decode(self._encoding, "replace") for line in lines]
-        begin = self._first_head(texts)
-        count = self._form.header_rows + self._form.units_rows
-        self.first = begin + count + 1
-        heads = [
-            self._cells(self._decoded(line), at + 1) for at, line in enumerate(lines[begin : begin + count], begin)
-        ]
-        offset = sum(len(line) + 1 for line in lines[: begin + count])
+        begin, end = self._head(texts)
+        heads = [self._cells(self._decoded(line), at) for at, line in enumerate(lines[begin:end], begin + 1)]
+        offset = sum(len(line) + 1 for line in lines[:end])
         return texts[:begin], heads, raw[offset:]
 
     def _decoded(self, raw: bytes) -> str:
@@ -114,18 +110,19 @@ class Sheet:
                 whole.count(b"\n", 0, at) + 1,
             ) from None
 
-    def _first_head(self, lines: Sequence[str]) -> int:
-        """Return the index of the first row of names."""
+    def _head(self, lines: Sequence[str]) -> tuple[int, int]:
+        """Return the indices of the first row of names and, after names and units, of data; set `first`."""
         header, upper, begins = self._form.header, self._form.header_rows - 1, [self._form.skip_rows]
         if header is not None:
             lasts = (place for place, _ in self._labeled(header, lines) if place >= max(upper, self._form.skip_rows))
             begins = [place - upper for place in lasts]
         if not begins:
             raise self._error(f"no line begins with {header!r}, the declared header of the column names{self._which}")
-        if not self._form.above:
-            return begins[0]
-        below = self._below(self._form.above, lines[: begins[-1]])
-        return next(begin for begin in begins if begin >= below)
+        below = self._below(self._form.above, lines[: begins[-1]]) if self._form.above else 0
+        begin = next(begin for begin in begins if begin >= below)
+        end = begin + self._form.header_rows + self._form.units_rows
+        self.first = end + 1
+        return begin, end
 
     def _labeled(self, label: str, lines: Sequence[str]) -> list[tuple[int, list[str]]]:
         """Indices and cells of the lines whose first cell is `label`."""
@@ -166,10 +163,8 @@ class Sheet:
         frame = _excel(self._path, int(place[2]) - 1 if place and not place[1] else sheet, self.file)
         rows = _texts(frame)
         lines = [self._form.separator.join(row) for row in rows]
-        begin = self._first_head(lines)
-        count = self._form.header_rows + self._form.units_rows
-        self.first = begin + count + 1
-        return lines[:begin], rows[begin : begin + count], frame.iloc[begin + count :].reset_index(drop=True)
+        begin, end = self._head(lines)
+        return lines[:begin], rows[begin:end], frame.iloc[end:].reset_index(drop=True)
 
     def _first_width(self) -> int:
         """Number of columns in the first row of data."""

@@ -70,7 +70,10 @@ def import_trial(
     already has this record; DatasetError if a file cannot be used, or `folder` already exists (with `add`: is not a
     data set that can be added to).
     """
-    recorded = _added_to(folder, known) if add else None
+    recorded = read_dataset(folder) if add else None
+    if recorded is not None and known and dict(known) != recorded.known:
+        problem = f"[known] has {recorded.known}, but --known gives {dict(known)}: correct [known], or omit --known"
+        raise DatasetError(problem, file=str(folder / TABLE_FILE))
     measured, edges = read_instrument(instrument, CHANNELS[planned.experiment], export)
     uno = _read_telemetry(_telemetry_file(telemetry), planned)
     clock = _line_up(edges, uno, instrument, telemetry)
@@ -88,14 +91,6 @@ def import_trial(
         return read_dataset(write_dataset(folder, Dataset(folder, name, dict(known or {}), (trial,)))), clock
     _refuse_copy(recorded, trial, instrument)
     return read_dataset(add_trial(recorded, trial).folder), clock
-
-
-def _added_to(folder: Path, known: Mapping[str, float] | None) -> Dataset:
-    recorded = read_dataset(folder)
-    if known and dict(known) != recorded.known:
-        problem = f"[known] has {recorded.known}, but --known gives {dict(known)}: correct [known], or omit --known"
-        raise DatasetError(problem, file=str(folder / TABLE_FILE))
-    return recorded
 
 
 def _next_repeat(recorded: Dataset, planned: PlannedTrial) -> PlannedTrial:

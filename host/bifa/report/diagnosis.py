@@ -35,11 +35,11 @@ HELD_OUT = "Held-out trials were measured, but neither model was fitted to them.
 Labels = Mapping[str, str]
 
 
-def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
-    """Return the engine's sentence on a verdict of `bifa diagnose --json`, with effects and their sizes in words."""
-    return engine_sentence(
-        verdict, effects, remainder, lambda effect: effect_words(effect["name"], effect["parameters"])
-    )
+def verdict_sentence(record: Mapping[str, Any]) -> str:
+    """Return the engine's sentence on the verdict in a record of `bifa diagnose --json` or in a campaign's summary,
+    with effects and their sizes in words."""
+    verdict, effects, remainder = (record[key] for key in ("verdict", "effects", "remainder"))
+    return engine_sentence(verdict, effects, remainder, lambda one: effect_words(one["name"], one["parameters"]))
 
 
 def diagnosis_page(
@@ -47,10 +47,9 @@ def diagnosis_page(
 ) -> Page:
     """Make the page for a record of `bifa diagnose --json`. `labels` names the trials by file; `curves`: sections that
     compare measurements with the models' predictions."""
-    effects = record["effects"]
     return Page(
         f"Diagnosis of {name}",
-        verdict_sentence(record["verdict"], effects, record["remainder"]),
+        verdict_sentence(record),
         [*lacking(record, labels), *further(record, labels), *curves],
         (f"{BASE_MODEL} {COMPLETED_MODEL} {RMS} {NOISE_FLOOR} {LOWERED} {HELD_OUT}",),
         (noise_table(record["error"]),),

@@ -110,7 +110,7 @@ def test_a_verdict_without_an_effect_and_without_held_out_trials_has_its_page(ve
     error = {"before": nothing, "after": nothing, "noise_floor": nothing}
     record = sample.DIAGNOSIS | {"verdict": verdict, "effects": [], "learnt": [], "error": error, "nearest": []}
     page = text_of(render(diagnosis_page("bench", record)))
-    assert verdict_sentence(verdict, [], record["remainder"]) in page
+    assert verdict_sentence(record) in page
     assert "None" not in page
 
 
