@@ -60,7 +60,7 @@ def test_a_sound_data_set_has_no_findings():
 @pytest.mark.parametrize(
     ("file", "column", "change", "kind", "line"),
     [
-        ("locomotion_2.csv", "pressure_body_psi", put(7, 9, 18.8), "saturated", 9),
+        ("locomotion_2.csv", "pressure_body_psi", put(7, 9, 18.731), "saturated", 9),
         ("locomotion_2.csv", "pressure_tail_psi", put(7, 9, -15.3), "clipped", 9),
         ("locomotion_1.csv", "displacement_head_mm", lambda x: np.minimum(x, x[25]), "clipped", 27),
         ("static_loading_3.csv", "force_N", lambda x: np.maximum(x, x[12]), "clipped", 2),
