@@ -39,8 +39,9 @@ def run() -> dict[str, float]:
         first = replace(what, rigs=what.rigs[:1], switches=what.switches[:1], sample_s=what.sample_s[:1])
         single = _best(lambda first=first: one.march(near[:1], first, False))
         together = _best(lambda what=what: lanes.march(near, what, True)) / len(near)
-        own = _best(lambda name=name: many.march(far, _experiment(name, far), False)) / len(far)
-        numba_far = _mean_in_numba(_experiment(name, far), far)
+        apart = _experiment(name, far)
+        own = _best(lambda apart=apart: many.march(far, apart, False)) / len(far)
+        numba_far = _mean_in_numba(apart, far)
         print(
             f"{name:18s} {1e3 * numba:7.3f}  {1e3 * single:7.3f}  {1e3 * together:10.3f} ({numba / together:.1f})"
             f"            {1e3 * own:7.3f} ({numba_far / own:.1f})"

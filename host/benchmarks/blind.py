@@ -190,9 +190,9 @@ def main() -> None:
             ):
                 records.append(record)
                 if options.records:
-                    known[record["kind"], record["seed"]] = record
-                    lines.write(options.records, map(brief, known.values()))
                     write_losses(options.records, record)
+                    known[record["kind"], record["seed"]] = record
+                    lines.write(options.records, map(brief, known.values()))  # last: an interrupted one is repeated
                 sizes = ", ".join(f"{size:.2f}" for size in record["sizes"].values())
                 print(
                     f"{record['kind']:8}{record['seed']}  {name_of(record['truth'])} ({sizes}) -> {said_of(record)}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from statistics import median
 
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import share_of_gap
@@ -99,12 +100,12 @@ def report(records: Sequence[dict], truth: str) -> None:
     _print_share("outside the library: unexplained", [r["verdict"] == "unexplained" for r in outside])
     closed = sorted(_closed(r) for r in records if r["kind"] in ("single", "pair") and r["verdict"] == "identified")
     if closed:
-        print(f"  median share of the gap closed {_median(closed):.2f}")
+        print(f"  median share of the gap closed {median(closed):.2f}")
     for name in BASELINES:
         _print_share(f"baseline {name}: one effect, named alone", [r["baselines"][name] == r["truth"] for r in single])
         _print_share(f"baseline {name}: no effect, says none", [not r["baselines"][name] for r in none])
     for kind, spent in _spent(records).items():
-        print(f"processor seconds, {kind:8} median {_median(spent):.0f}, longest {spent[-1]:.0f}")
+        print(f"processor seconds, {kind:8} median {median(spent):.0f}, longest {spent[-1]:.0f}")
     print("\ntruth -> named")
     for (truth, said), count in sorted(Counter((name_of(r["truth"]), said_of(r)) for r in records).items()):
         print(f"  {count:3d}  {truth:40} {said}")
@@ -124,7 +125,7 @@ def table(records: Mapping[str, Sequence[dict]]) -> str:
             cells.append(f"{value} | {_REQUIRED[title][truth]}")
         lines.append(f"| {title.format('1.2 (foreign: 1.3)')} | {' | '.join(cells)} |")
     each = [_spent(of) for of in records.values()]
-    spent = [", ".join(f"{_median(s[kind]):.0f}" if kind in s else "-" for kind in KINDS) for s in each]
+    spent = [", ".join(f"{median(s[kind]):.0f}" if kind in s else "-" for kind in KINDS) for s in each]
     lines.append(f"| processor time, median, s: {', '.join(KINDS)} | {' | '.join(f'{s} | -' for s in spent)} |")
     return "\n".join(lines)
 
@@ -133,10 +134,6 @@ def _spent(records: Sequence[dict]) -> dict[str, list[float]]:
     """Processor seconds by kind, in ascending order."""
     by_kind = {kind: sorted(r["processor_seconds"] for r in records if r["kind"] == kind) for kind in KINDS}
     return {kind: spent for kind, spent in by_kind.items() if spent}
-
-
-def _median(rising: Sequence[float]) -> float:
-    return rising[len(rising) // 2]
 
 
 def _mean_size(records: Sequence[dict]) -> float:

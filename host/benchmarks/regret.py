@@ -152,10 +152,14 @@ def regrets(record: dict) -> list[float]:
     """For every seed, nominal and robust, the share by which it is slower than the best known."""
     found = []
     for kind in (kind for kind in ("nominal", "robust") if kind in record):
-        others = [record[name] for name in ("de", *PEERS) if name in record] if kind == "nominal" else []
-        best = max([*record[kind], *record[f"{kind}_long"], *others])
+        best = _best_known(record, kind)
         found += [0.0 if best <= 0.0 else 1.0 - speed / best for speed in record[kind]]
     return found
+
+
+def _best_known(record: dict, kind: str) -> float:
+    peers = [record[name] for name in ("de", *PEERS) if name in record] if kind == "nominal" else []
+    return max([*record[kind], *record[f"{kind}_long"], *peers])
 
 
 def row(name: str, record: dict) -> str:
@@ -165,7 +169,7 @@ def row(name: str, record: dict) -> str:
         if kind not in record:
             text += 25 * " "
             continue
-        best = max([*record[kind], *record[f"{kind}_long"]])
+        best = _best_known(record, kind)
         text += f"{min(record[kind]):9.2f}{best:9.2f}{record[f'{kind}_s']:7.1f}"
     peers = "".join(f"{record[name]:9.2f}" if name in record else 9 * " " for name in ("de", *PEERS))
     return text + f"{record['evaluations']:8}{peers}{100 * max(regrets(record)):9.2f}"
@@ -185,7 +189,6 @@ def run(
     long: int,
     models: Path | None = None,
     kept: Path | None = None,
-    only_print: bool = False,
     every: int | None = None,
     earlier: Path | None = None,
 ) -> dict[str, float]:
@@ -200,14 +203,11 @@ def run(
     try:
         with simulations() as runs:
             for number, (name, model, settings) in enumerate(asked):
-                if only_print and name not in known:
-                    continue
                 record = known.setdefault(name, before.get(name, {"robot": name}))
-                if not only_print:
-                    fully = number * every // len(asked) > (number - 1) * every // len(asked)
-                    known[name] = searched(record, model, settings, range(seeds), long, runs, fully)
-                    if kept and known[name] != record:
-                        lines.write(kept, known.values())
+                fully = number * every // len(asked) > (number - 1) * every // len(asked)
+                known[name] = searched(record, model, settings, range(seeds), long, runs, fully)
+                if kept and known[name] != record:
+                    lines.write(kept, known.values())
                 found.append(known[name])
                 print(row(name, known[name]), flush=True)
     except KeyboardInterrupt:
@@ -241,8 +241,13 @@ def main() -> None:
     options = parser.parse_args()
     if options.print and options.records is None:
         parser.error("--print needs the records to print: add --records FILE")
+    if options.print:
+        found = list(lines.read(options.records, "robot").values())
+        print("\n".join([HEADING, *(row(one["robot"], one) for one in found)]))
+        summed_up(found)
+        return
     kept, earlier = options.records, options.earlier
-    run(options.robots, options.seeds, options.long, options.models, kept, options.print, options.fully, earlier)
+    run(options.robots, options.seeds, options.long, options.models, kept, options.fully, earlier)
 
 
 if __name__ == "__main__":

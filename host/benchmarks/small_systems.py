@@ -71,8 +71,8 @@ def run(todo: list[tuple[str, int]], path: Path, with_peers: bool) -> list[dict]
             print(f"left out: {error}", flush=True)
             continue
         known[truth, seed], losses[truth, seed] = record, tried
-        lines.write(path, known.values())
         lines.write(losses_beside(path), losses.values())
+        lines.write(path, known.values())  # last: an interrupted set is diagnosed again
         print(
             f"{count:3d} of {len(todo)}  {time.monotonic() - began:5.0f} s  {truth:8}{seed}  {record['system']:11}"
             f"{name_of(record['truth']):32} -> {said_of(record)}  {record['processor_seconds']:.1f} s of processor",

@@ -18,7 +18,8 @@ def compiled(name: str, command: Sequence[str], sources: Sequence[Path], include
     Raises RuntimeError with the compiler's messages.
     """
     headers = sorted((ROOT / "lib").glob("*/*.h"))
-    digest = hashlib.sha256(b"".join(path.read_bytes() for path in [*sources, *included, *headers])).hexdigest()[:16]
+    contents = [repr([*command]).encode(), *(path.read_bytes() for path in [*sources, *included, *headers])]
+    digest = hashlib.sha256(b"".join(contents)).hexdigest()[:16]
     target = BUILD / f"{name}-{digest}"
     if not target.exists():
         BUILD.mkdir(parents=True, exist_ok=True)

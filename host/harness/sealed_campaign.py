@@ -18,6 +18,7 @@ import numpy as np
 import tomli_w
 
 from bifa.errors import BifaError
+from bifa.files import write_text
 from bifa.measure import plan
 from bifa.measure.session import Event, run_session
 from virtual_robot.effects import EFFECTS
@@ -43,12 +44,16 @@ def generate(
     trials: Sequence[plan.PlannedTrial] | None = None,
     profile: str = "realistic",
 ) -> None:
-    """Measure a sealed robot into the data set `out`, then write its seal (default: OUT.sealed.toml).
+    """Measure a sealed robot into the data set `out`, and its seal before it (default: OUT.sealed.toml).
 
     `effect` and `size` (a factor of its modest size) replace what would be drawn; `trials` replaces the campaign's
     session. Raises VirtualRobotError or BifaError.
     """
     forced: dict[str, dict[str, float]] = {}
+    if out.exists():
+        raise SealedError(f"{out} exists already; data sets are never overwritten")
+    if size is not None and effect is None:
+        raise SealedError("the size of a drawn effect is drawn as well; name the effect")
     if effect is not None:
         if effect not in EFFECTS:
             raise SealedError(f"no effect {effect!r}; there are {', '.join(EFFECTS)}")
@@ -57,6 +62,14 @@ def generate(
         forced = {effect: EFFECTS[effect].at(factor, random)}
     drawn = "none" if forced else KINDS[kind]
     with open_rig(profile=profile, seed=seed, sealed=seed, sealed_kind=drawn, effects=forced, keep_events=False) as rig:
+        inside = rig.open_seal()
+        sizes = {name: _factor(name, values) for name, values in inside.items()}
+        content = {"format": 1, "truth": profile, "seed": seed, "kind": kind, "sizes": sizes, "effects": inside}
+        content["parameters"] = rig.truth
+        # before the data set, which is not measured again once it is complete
+        seal = label or out.with_name(out.name + ".sealed.toml")
+        seal.parent.mkdir(parents=True, exist_ok=True)
+        write_text(seal, tomli_w.dumps(content))
         run_session(
             rig,
             out,
@@ -68,11 +81,6 @@ def generate(
         )
         if sys.stderr.isatty():
             print(file=sys.stderr)
-        inside = rig.open_seal()
-        sizes = {name: _factor(name, values) for name, values in inside.items()}
-        content = {"format": 1, "truth": profile, "seed": seed, "kind": kind, "sizes": sizes, "effects": inside}
-        content["parameters"] = rig.truth
-    (label or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(content))
 
 
 def _factor(name: str, values: dict[str, float]) -> float:

@@ -85,8 +85,7 @@ class _Pump:
             wall = time.monotonic() - wall_start
             behind = wall - (world.now() - virtual_start)
             if behind > _MAX_LAG_S:
-                wall_start += behind
-                behind = _SLICE_S
+                wall_start, wall, behind = wall_start + behind, wall - behind, _SLICE_S
             if behind > 0:
                 world.run(min(behind, 4 * _SLICE_S))
             self._to_host()

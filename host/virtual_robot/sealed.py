@@ -124,6 +124,8 @@ def generate(
         raise SealedError(f"no kind {kind!r}; there are {', '.join(KINDS)}")
     if effect is not None and effect not in EFFECTS:
         raise SealedError(f"no effect {effect!r}; there are {', '.join(EFFECTS)}")
+    if size is not None and effect is None:
+        raise SealedError("the size of a drawn effect is drawn as well; name the effect")
     random = np.random.default_rng(seed)
     parameters, curves = specimen(random)
     effects, sizes = draw_effects(kind, random)

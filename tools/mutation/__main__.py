@@ -90,8 +90,8 @@ def tried(chosen: Sequence[Mutant], jobs: int, expected: Container) -> dict[Muta
     workers = [threading.Thread(target=work, args=(number,), daemon=True) for number in range(jobs)]
     for worker in workers:
         worker.start()
-    while any(worker.is_alive() for worker in workers):
-        workers[-1].join(PROGRESS_S)
+    while alive := [worker for worker in workers if worker.is_alive()]:
+        alive[0].join(PROGRESS_S)
         time.sleep(0.01)
         print(f"mutation: {len(verdicts)} of {len(chosen)}", file=sys.stderr)
     if failures:

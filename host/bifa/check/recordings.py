@@ -14,7 +14,7 @@ from .finding import Finding
 from .lag import displacement_lag, misfit, session_misfit
 
 SENSOR_SPAN_PSI = 15.0  # Honeywell ABP...015PD: +-15 psi; beyond it the output is not specified
-# The middles of the steps of counts 0 and 1023 (`sensor_mpsi` in lib/pressure), since 10-90 % of the supply span 30 psi.
+# The middles of counts 0 and 1023 (`sensor_mpsi` in lib/pressure): 10-90 % of the supply span 30 psi.
 ADC_LIMITS_PSI = (-18.73, 18.73)
 REPEATS_WANTED = 3  # as in the paper's section IV
 SHORT_SHARE = 0.75  # of how long the other repeats last: a record cut off, as when the power fails
