@@ -239,6 +239,7 @@ void Controller::finish_sample() {
     sampling_.pressure_mpsi[i] = pressure_mpsi(i);
   }
   rest_.add(raw_mpsi);
+  if (supervisor_.state() != State::kIdle) rest_.restart();  // held air may be steady, too
   last_second_.add(sampling_.pressure_mpsi);
   watch(sampling_.pressure_mpsi);
   if (sample_waits_) lose_sample();

@@ -8,6 +8,8 @@ namespace bifa {
 /// Slow means of the raw pressures, and how long they have not moved.
 class Rest {
  public:
+  /// Begins again: what has been steady so far does not count.
+  void restart() { samples_ = 0; }
   /// Adds a sample; 100 a second.
   void add(const int16_t (&raw_mpsi)[kChamberCount]);
 

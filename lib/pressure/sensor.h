@@ -15,7 +15,7 @@ struct RawRound {
 };
 
 /// Pressure from the sum of kOversampling conversions: 0.1 to 0.9 of the supply is -15 to 15 psi. Returns -18732 to
-/// 18731.
+/// 18732.
 int16_t sensor_mpsi(uint16_t sum);
 
 /// Pressure from one conversion of the monitor: 1 to 5 V is 0 to 130 psi; clamped to int16_t.

@@ -579,6 +579,20 @@ void test_a_chamber_under_pressure_is_not_taken_for_zero() {
   equal(Verdict::kOffset, bench.controller.measure_zero(zero));
 }
 
+void test_air_that_was_held_is_not_taken_for_zero() {
+  Bench bench;
+  bench.noisy = false;
+  bench.pressure(0, 530);  // 0.7 psi, which the regulator may leave at a set-point of 0
+  equal(Verdict::kDone, bench.controller.hold(Chamber::kBody, ChamberState::kPositive));
+  bench.tick(6000);
+  bench.controller.stop();
+  bench.tick(20);
+  Calibration zero;
+  equal(Verdict::kUnrest, bench.controller.measure_zero(zero));
+  bench.tick(4100);
+  equal(Verdict::kDone, bench.controller.measure_zero(zero));
+}
+
 // A chamber that vents through its valve: 8.5 psi at first, a time constant of 1.7 s.
 void test_zero_is_not_taken_while_a_chamber_still_vents() {
   Bench bench;
@@ -1072,6 +1086,7 @@ void run() {
   RUN_TEST(test_samples_that_nobody_takes_are_counted);
   RUN_TEST(test_zero_is_measured_while_idle_and_taken_off_every_sample);
   RUN_TEST(test_a_chamber_under_pressure_is_not_taken_for_zero);
+  RUN_TEST(test_air_that_was_held_is_not_taken_for_zero);
   RUN_TEST(test_zero_is_not_taken_while_a_chamber_still_vents);
   RUN_TEST(test_frozen_sensors_are_found_at_every_gait_of_the_box);
   RUN_TEST(test_an_open_input_is_found_within_two_seconds_whatever_the_valves_do);
