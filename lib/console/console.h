@@ -23,6 +23,10 @@ class Console {
   void feed(uint8_t byte);
   /// Call if bytes were lost: the present line is answered with an error, unless it ends in "stop".
   void spoil() { spoilt_ = true; }
+  /// Call after a frame that is none: a stray 0x00 may have begun it within a line, whose rest it took.
+  void spoil_begun() {
+    if (length_ > 0) spoil();
+  }
 
   /// Whether the last command is still busy (EEPROM) and has not been answered.
   bool waiting() const { return waiting_; }

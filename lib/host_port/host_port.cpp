@@ -54,8 +54,9 @@ void HostPort::take(uint8_t byte) {
   } else if (decoder_.finish(session_.seed())) {
     commands_.controller().host_heard();
     session_.take(decoder_.frame(), {frames_bad_, receiver_.lost()});
-  } else if (frames_bad_ != 0xFFFF) {
-    ++frames_bad_;
+  } else {
+    console_.spoil_begun();
+    if (frames_bad_ != 0xFFFF) ++frames_bad_;
   }
 }
 

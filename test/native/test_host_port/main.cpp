@@ -199,6 +199,16 @@ void test_a_stop_is_carried_out_behind_a_frame_that_was_torn() {
   TEST_ASSERT_TRUE(bench.controller.state() == State::kIdle);
 }
 
+// A blank is one bit away from a delimiter, behind which the rest of the line is taken for a frame.
+void test_a_line_whose_end_a_stray_delimiter_took_is_not_carried_out() {
+  Bench bench;
+  bench.arrive(std::string("save\0fast\n", 10));
+  bench.wait(100);
+  TEST_ASSERT_TRUE(said(bench.say(""), "error the line arrived damaged"));
+  TEST_ASSERT_EQUAL(0xFF, cells[0]);
+  TEST_ASSERT_TRUE(said(bench.say("status"), "idle"));
+}
+
 // ---- a new session ----
 
 void test_a_new_session_ends_the_timed_holds_of_an_earlier_one() {
@@ -282,6 +292,7 @@ void run() {
   RUN_TEST(test_a_line_that_is_too_long_stops_if_it_ends_in_stop);
   RUN_TEST(test_other_lines_that_arrived_damaged_are_answered_so_and_do_nothing);
   RUN_TEST(test_a_stop_is_carried_out_behind_a_frame_that_was_torn);
+  RUN_TEST(test_a_line_whose_end_a_stray_delimiter_took_is_not_carried_out);
   RUN_TEST(test_a_new_session_ends_the_timed_holds_of_an_earlier_one);
   RUN_TEST(test_a_new_session_does_not_commit_what_an_earlier_one_began);
   RUN_TEST(test_a_connect_of_another_start_opens_nothing);
