@@ -60,7 +60,7 @@ extern const uint8_t kStopFrame[kStopFrameBytes];
 /// Exact size of the fields of a message to the Uno; false if there is no such message.
 bool inward_size(uint8_t message, uint8_t& size);
 
-/// open a session; voids whatever an earlier one left unfinished, and vents its timed holds.
+/// open a session; voids whatever an earlier one left unfinished, and vents timed holds that still wait.
 struct ConnectMessage {
   uint16_t boot_nonce;
   uint16_t session_key;

@@ -11,7 +11,7 @@ enum class Fault : uint8_t {
   kNone,
   kOverPressure,   ///< value: pressure, limit: the trip (mpsi)
   kSensorRange,    ///< value: pressure, limit: end of the sensor's range (mpsi); broken wire, or saturated
-  kSensorStuck,    ///< value: pressure (mpsi), limit: how long it did not change (ms)
+  kSensorStuck,    ///< value: pressure (mpsi), limit: 2000 ms without a change, or 1000 mpsi: open input
   kRegulator,      ///< value: the regulator's monitor, limit: the set-point (mpsi)
   kSupplyControl,  ///< the DAC does not answer; value: consecutive failures, limit: how many are tolerated
   kHostSilent,     ///< value: silence, limit: host_timeout_s (both in 10 ms)

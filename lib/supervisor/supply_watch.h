@@ -7,7 +7,7 @@
 
 namespace bifa {
 
-/// Consecutive failures of the DAC that are tolerated.
+/// Consecutive failures of the DAC that are a fault.
 const uint8_t kDacAttempts = 3;
 
 /// One count of the monitor is 0.16 psi; the regulator's linearity is 1 % of 130 psi.
