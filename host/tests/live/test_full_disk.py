@@ -56,13 +56,22 @@ def test_a_file_that_a_full_disk_does_not_take_is_named(names):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), *names)
 
 
-@pytest.mark.parametrize("command", [["upload", "{gait}", "--run"], ["record", "--gait", "{gait}", "--out", "{out}"]])
+WALKING = [["upload", "{gait}", "--run"], ["record", "--gait", "{gait}", "--out", "{out}"]]
+
+
+def begun(command, uno, gait, folder):
+    """A command that has set the robot in motion."""
+    command = bifa(*(word.format(gait=gait, out=folder / "walk") for word in command), "--port", uno.device)
+    walking = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while uno.board.state != "running":
+        assert walking.poll() is None
+        time.sleep(0.05)
+    return walking
+
+
+@pytest.mark.parametrize("command", WALKING)
 def test_who_walks_stops_once_nobody_can_read_it_any_more(uno, gait, command, tmp_path):
-    command = bifa(*(word.format(gait=gait, out=tmp_path / "walk") for word in command), "--port", uno.device)
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as walking:
-        while uno.board.state != "running":
-            assert walking.poll() is None
-            time.sleep(0.05)
+    with begun(command, uno, gait, tmp_path) as walking:
         walking.stdout.close()
         walking.stdout = None
         _, errors = walking.communicate(timeout=60)
@@ -70,13 +79,9 @@ def test_who_walks_stops_once_nobody_can_read_it_any_more(uno, gait, command, tm
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
 
 
-@pytest.mark.parametrize("command", [["upload", "{gait}", "--run"], ["record", "--gait", "{gait}", "--out", "{out}"]])
+@pytest.mark.parametrize("command", WALKING)
 def test_output_that_nobody_reads_does_not_hide_that_the_robot_may_be_moving(uno, gait, command, tmp_path):
-    command = bifa(*(word.format(gait=gait, out=tmp_path / "walk") for word in command), "--port", uno.device)
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as walking:
-        while uno.board.state != "running":
-            assert walking.poll() is None
-            time.sleep(0.05)
+    with begun(command, uno, gait, tmp_path) as walking:
         uno.board.write = lambda data: None  # a wire is broken
         walking.send_signal(signal.SIGINT)
         walking.stdout.close()
