@@ -24,7 +24,7 @@ from bifa.measure.session import Event, run_session
 from virtual_robot.effects import EFFECTS
 from virtual_robot.errors import VirtualRobotError
 from virtual_robot.rig import open_rig
-from virtual_robot.sealed import SIZES, SealedError
+from virtual_robot.sealed import SIZES, check_request
 
 KINDS = {"one": "single", "none": "none", "pair": "pair", "outside": "outside"}
 
@@ -50,13 +50,8 @@ def generate(
     session. Raises VirtualRobotError or BifaError.
     """
     forced: dict[str, dict[str, float]] = {}
-    if out.exists():
-        raise SealedError(f"{out} exists already; data sets are never overwritten")
-    if size is not None and effect is None:
-        raise SealedError("the size of a drawn effect is drawn as well; name the effect")
+    check_request(out, effect, size)
     if effect is not None:
-        if effect not in EFFECTS:
-            raise SealedError(f"no effect {effect!r}; there are {', '.join(EFFECTS)}")
         random = np.random.default_rng([seed, 0xEF])
         factor = float(random.uniform(*SIZES)) if size is None else size
         forced = {effect: EFFECTS[effect].at(factor, random)}

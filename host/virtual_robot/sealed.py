@@ -118,14 +118,9 @@ def generate(
     exists, or if the kind or effect is unknown.
     """
     out = Path(out)
-    if out.exists():
-        raise SealedError(f"{out} exists already; data sets are never overwritten")
+    check_request(out, effect, size)
     if kind not in KINDS:
         raise SealedError(f"no kind {kind!r}; there are {', '.join(KINDS)}")
-    if effect is not None and effect not in EFFECTS:
-        raise SealedError(f"no effect {effect!r}; there are {', '.join(EFFECTS)}")
-    if size is not None and effect is None:
-        raise SealedError("the size of a drawn effect is drawn as well; name the effect")
     random = np.random.default_rng(seed)
     parameters, curves = specimen(random)
     effects, sizes = draw_effects(kind, random)
@@ -138,6 +133,16 @@ def generate(
     content = {"format": 1, **asdict(label)}
     (label_file or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(content))
     return label
+
+
+def check_request(out: Path, effect: str | None, size: float | None) -> None:
+    """Raise SealedError if `out` exists, or if the effect is unknown or has a size without being named."""
+    if out.exists():
+        raise SealedError(f"{out} exists already; data sets are never overwritten")
+    if effect is not None and effect not in EFFECTS:
+        raise SealedError(f"no effect {effect!r}; there are {', '.join(EFFECTS)}")
+    if size is not None and effect is None:
+        raise SealedError("the size of a drawn effect is drawn as well; name the effect")
 
 
 def write(out: Path, name: str, lab: Lab, random: np.random.Generator) -> None:

@@ -58,17 +58,17 @@ def enter(robot: Mover) -> None:
     Signals that the program or `nohup` already handles differently are left alone. Outside the main thread, the only
     one that receives signals, no handlers are installed.
     """
-    if not _active_robots and threading.current_thread() is threading.main_thread():
+    is_first = not _active_robots and threading.current_thread() is threading.main_thread()
+    if is_first:
         for name, handler in _HANDLERS.items():
             number = getattr(signal, name, None)  # Windows has the first two, and SIGBREAK
             if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 _earlier_handlers[number] = signal.signal(number, handler)
         _earlier_hook.append(sys.unraisablehook)
         sys.unraisablehook = _retry_interrupt
-        _active_robots.append(robot)
+    _active_robots.append(robot)
+    if is_first:
         _watch_parent()
-    else:
-        _active_robots.append(robot)
 
 
 def leave(robot: Mover) -> None:
