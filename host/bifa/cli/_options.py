@@ -102,13 +102,14 @@ def kept(out: Path, what: str) -> str:
 
 
 @contextmanager
-def stoppable(kept: Callable[[], str]) -> Iterator[None]:
-    """On Ctrl-C, print what was kept, as described by `kept()`, and exit with status 130."""
+def stoppable(kept: Callable[[], str], moves: bool = True) -> Iterator[None]:
+    """On Ctrl-C, print what is known of the valves, if the command moves a robot, and what was kept, as described by
+    `kept()`; exit with status 130."""
     try:
         yield
     except KeyboardInterrupt as interrupt:
-        from bifa.link.leaving import raise_if_unconfirmed
+        from bifa.link.leaving import valves_at
 
-        raise_if_unconfirmed(interrupt)
-        typer.echo(f"\nstopped; {kept()}")
+        valves = f"{valves_at(interrupt)}; " if moves else ""
+        typer.echo(f"\nstopped; {valves}{kept()}")
         raise typer.Exit(130) from None

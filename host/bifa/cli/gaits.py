@@ -35,7 +35,7 @@ def gaits(
             requires("--out", model=model)  # the package's gaits are the nominal robot's
         folder = out or library.FOLDER
         check_targets(folders=(folder,))
-        with stoppable(lambda: f"the gaits listed above are in {folder}"):
+        with stoppable(lambda: f"the gaits listed above are in {folder}", moves=False):
             _make(console, model, folder, names, seed or 0)
         return
     requires("--make", model=model, out=out, seed=seed)

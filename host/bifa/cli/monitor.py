@@ -50,7 +50,7 @@ def monitor(
     check_port(port)
 
     from bifa.link import Uno
-    from bifa.link.leaving import raise_if_unconfirmed
+    from bifa.link.leaving import valves_at
     from bifa.live.monitor import watch
     from bifa.rig import SameBoard, open_rig
     from bifa.robot import load_model, nominal
@@ -84,5 +84,4 @@ def monitor(
             say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
             fly(pilot, SameBoard(port), page.tell, say, seconds, begin)
     except KeyboardInterrupt as interrupt:
-        raise_if_unconfirmed(interrupt)
-        typer.echo("valves off")
+        typer.echo(valves_at(interrupt))

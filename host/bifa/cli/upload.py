@@ -41,13 +41,13 @@ def upload(
     check_port(port)
 
     from bifa.link import Uno
-    from bifa.link.leaving import raise_if_unconfirmed
+    from bifa.link.leaving import valves_at
     from bifa.live.walk import walk
     from bifa.rig import open_rig
     from bifa.robot.gait import read_gait_file
 
     parameters = read_gait_file(gait).parameters
-    console = Console()
+    console, valves = Console(), "valves off"
     with open_rig(port) as rig:
         try:
             with console.status("waiting for the Uno") as shown, Uno(rig.transport, rig.clock) as uno:
@@ -59,8 +59,8 @@ def upload(
                     console.print("walking; Ctrl-C ends" if seconds is None else f"walking for {seconds:g} s")
                     walk(uno, rig.clock, seconds, shown.update)
         except KeyboardInterrupt as interrupt:
-            raise_if_unconfirmed(interrupt)
             if not run:
                 raise
+            valves = valves_at(interrupt)
         if run:
-            console.print("valves off")
+            console.print(valves)

@@ -47,6 +47,7 @@ _retry_timers: list[threading.Timer] = []
 _parents: list[int] = []  # the parent's process id, while its death ends this program
 _uninterruptible: set[CodeType] = set()  # code of the functions that must not be interrupted
 AGAIN_AFTER_S = 0.01
+UNANSWERED = "a stop was sent, but no Uno had answered yet"
 _SET_DEATH_SIGNAL, _GET_DEATH_SIGNAL = 1, 2  # PR_SET_PDEATHSIG, PR_GET_PDEATHSIG of prctl(2)
 _DEATH: Any = getattr(signal, "SIGUSR2", None)  # a separate signal: it also comes if only a thread of the parent ends
 
@@ -195,6 +196,13 @@ def raise_if_unconfirmed(last: BaseException) -> None:
         if isinstance(replaced, StillMovingError):
             raise replaced from last
         replaced = replaced.__context__
+
+
+def valves_at(interrupt: KeyboardInterrupt) -> str:
+    """Return what is known of the valves, in words, when a command ends on `interrupt`: off, unless the Uno that it
+    interrupted noted otherwise. Raises the StillMovingError that `interrupt` replaced (raise_if_unconfirmed)."""
+    raise_if_unconfirmed(interrupt)
+    return UNANSWERED if UNANSWERED in getattr(interrupt, "__notes__", ()) else "valves off"
 
 
 def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> Report:

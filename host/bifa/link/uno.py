@@ -141,6 +141,8 @@ class Uno:
         try:
             if self.session.hello is None:  # never connected: nothing was moved, and nothing will answer
                 self.send_stop()
+                if error is not None:
+                    error.add_note(leaving.UNANSWERED)
             else:
                 leaving.stop_in_new_session(self.session)
                 self.may_move = False

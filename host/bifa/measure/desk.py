@@ -106,7 +106,8 @@ class Desk:
             self._lines.put(_END)
             if self._watch is None:
                 raise NobodyError(
-                    "stdin is closed; no one can answer the prompts. Start it in a terminal, or --watch a folder"
+                    "stdin is closed; no one can answer the prompts. Run it in a terminal "
+                    "(bifa experiment and bifa campaign can also --watch a folder)"
                 )
             return None
         return line.strip()

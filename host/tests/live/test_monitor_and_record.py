@@ -5,7 +5,9 @@ import csv
 import io
 import itertools
 import math
+import os
 import re
+import select
 import signal
 import sys
 import threading
@@ -26,6 +28,7 @@ from bifa.rig import RigError, SameBoard, SerialRig
 from harness.board import Board
 from harness.pty_uno import PtyUno
 from harness.terminal import Terminal
+from harness.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.real_time
 
@@ -46,6 +49,18 @@ def test_the_monitor_says_that_the_port_is_gone(uno, tmp_path):
         uno.unplug()
         assert terminal.exit_status() == 2
         terminal.sees(f"error: {uno.device} is gone")
+
+
+def test_valves_are_not_called_off_by_a_port_that_never_answers(tmp_path):
+    ours, theirs = os.openpty()
+    try:
+        with Terminal(tmp_path, "monitor", "--port", os.ttyname(theirs)) as terminal:
+            select.select([ours], [], [], PATIENCE_S)  # it greets
+            terminal.presses("\x03")
+            terminal.sees("a stop was sent, but no Uno had answered yet")
+    finally:
+        os.close(theirs)
+        os.close(ours)
 
 
 def watched(board: Board, begin=lambda uno: None) -> str:
