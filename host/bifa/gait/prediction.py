@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bifa.effects import library
-from bifa.gait.settling import CAMERA_MM, MIN_CYCLES, STANDING_MM_S, settling
+from bifa.gait.settling import CAMERA_MM, MIN_CYCLES, STANDING_MM_S, settling, speed_of_cycles
 from bifa.gait.uncertainty import Knowledge
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
@@ -99,8 +99,8 @@ class Predictor:
     def of(
         self, gait: Gait, *, cycles: int = CYCLES, clock_rate: float | None = None, workers: int | None = None
     ) -> Prediction:
-        """Walk `gait` on each robot and judge it by the rule for measured walks: if a walk never settles (a growing
-        tether), the second half of its `cycles` counts.
+        """Walk `gait` on each robot and measure it as a camera would, by the rule for measured walks: if a walk never
+        settles (a growing tether), the second half of its `cycles` counts.
 
         clock_rate: seconds per second of the Uno, default as known; speeds are on the Uno's clock.
         """
@@ -115,13 +115,15 @@ class Predictor:
         begins = [f.begins for f in found[:draws] if f.is_settled]
         settled = int(np.ceil(np.quantile(begins, 0.95))) if begins else CYCLES  # of nineteen of twenty robots
         means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
-        noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
-        camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (MIN_CYCLES * gait.period_s)  # of a speed over `MIN_CYCLES` cycles
         means = np.nan_to_num(means)
         backward = bool(np.mean(means) < -STANDING_MM_S)
         along = np.fmax(-means if backward else means, 0.0)
         drawn, own_mm_s = along[:draws], float(along[draws])
-        errors = drawn * self._noise_share * noise[0] + noise[1] * camera_mm_s
+        random = np.random.default_rng([self._seed, 5])
+        seen_mm = advance_mm[:draws] + np.diff(CAMERA_MM * random.standard_normal((draws, cycles + 1)))
+        seen_mm_s = np.nan_to_num([speed_of_cycles(one, gait.period_s).mean_mm_s for one in seen_mm])
+        errors = (-seen_mm_s if backward else seen_mm_s) - drawn
+        errors += drawn * self._noise_share * random.standard_normal(draws)
         return Prediction(drawn, settled + MIN_CYCLES, backward, errors, own_mm_s)
 
     def _with_switch_errors(self, rows: np.ndarray) -> np.ndarray:
