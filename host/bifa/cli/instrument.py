@@ -154,9 +154,11 @@ def _column(console: Console, seen: "Look", name: str, proposed: str | None) -> 
 def _is_there(console: Console, seen: "Look", column: str) -> bool:
     """Whether the export has the column; prints an error if it has not."""
     from bifa.data.errors import DatasetError
+    from bifa.data.export import ROW_NUMBER
 
     try:
-        seen.sheet.find(column)
+        if column != ROW_NUMBER:
+            seen.sheet.find(column)
     except DatasetError as error:
         console.print(str(error))
         return False

@@ -63,17 +63,18 @@ _SPELLINGS = {  # of units, as programs write them, in lower case
 }
 _UNIT_ALIASES = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings.split()}
 _ROWS = {"skip_rows": 0, "header_rows": 0, "units_rows": 0}  # and the minimum of each
-_CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ",")}
+_CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ","), "thousands": (",", ".", "'", " ")}
 _TEXTS = ("header", "units_above", "encoding", "sheet")
 _TABLES = ("columns", "units", "factor", "sign", "offset")  # keyed by the data set's columns
 _KEYS = ("preset", *_CHOICES, "separator", *_TEXTS, *_ROWS, "above", *_TABLES, "where", "sync")
 _KEYS += ("rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]")
+_BEHIND = re.compile(r".*?(\S+?)\s*[/,]\s*([^/,]+)")
 _FRACTION = re.compile("[.,]%f")  # in the form of a date
 _YEAR_OF_TIMES = 1900  # of dates that name none, by strptime
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
-_ROW_NUMBER = "[0]"  # in place of a column: the number of the row, from 0
+ROW_NUMBER = "[0]"  # in place of a column: the number of the row, from 0
 SLOWEST_SYNC_S = 0.002  # the strobe is high for 2.6 ms
 
 
@@ -125,7 +126,7 @@ def read_columns(
     rows = _rows(sheet, export)
     there = [name for name in optional if name in export.columns or name in sheet.labels()]
     columns = {name: _column(sheet, export, name, rows) for name in (*wanted, *there)}
-    read = [values for name, values in columns.items() if export.columns.get(name) != _ROW_NUMBER]
+    read = [values for name, values in columns.items() if export.columns.get(name) != ROW_NUMBER]
     filled = np.flatnonzero(np.any([~np.isnan(values) for values in read], axis=0))
     count = filled[-1] + 1 if len(filled) else 0
     return {name: values[:count] for name, values in columns.items()}, rows[:count]
@@ -177,7 +178,7 @@ def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.nda
         moments = _moments(sheet, export, source, rows)
         _refuse_midnight(sheet, moments, rows, source)
         return np.append(_seconds(moments, moments), np.full(len(rows) - len(moments), np.nan))
-    if source == _ROW_NUMBER:
+    if source == ROW_NUMBER:
         values = rows.astype(float)
     else:
         place = sheet.find(source)
@@ -246,8 +247,11 @@ def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) ->
 
 
 def unit_in_file(sheet: Sheet, place: int) -> str | None:
-    """Return the unit that a file itself gives for a column: in a row of units, or in brackets in its name."""
-    named = [name for name in sheet.names[place][-1:] if _BRACKETS.search(name)]
+    """Return the unit that a file itself gives for a column: in a row of units, or in its name, in brackets or behind a
+    stroke or comma ("Kraft / kN", "load, kN")."""
+    last = "".join(sheet.names[place][-1:])
+    behind = _BEHIND.fullmatch(last)  # but not the "s" of "mm/s"
+    named = [last] if _BRACKETS.search(last) else [behind[2]] if behind and not _unit_called(behind[1]) else []
     return next(filter(None, map(unit_in, (*sheet.units[place], *named))), None)
 
 
@@ -262,7 +266,7 @@ def _unit_called(word: str) -> str | None:
     word = word.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
     if word in _KNOWN:
         return word
-    alike = {unit.lower(): unit for unit in _KNOWN if len(unit) > 1}
+    alike = {unit.lower(): unit for unit in _KNOWN - {"mN"} if len(unit) > 1}  # "MN" is not mN
     return (alike | _UNIT_ALIASES).get(word.lower())
 
 
@@ -299,6 +303,8 @@ def parse_export(fields: Fields, name: str) -> Export:
     except (ZoneInfoNotFoundError, OSError):
         raise fields.error("zone", f"unknown time zone {export.zone!r}: write it as Europe/Berlin, or UTC") from None
     _check_columns(fields, export)
+    if export.where and ROW_NUMBER in export.columns.values():
+        raise fields.error("where", f"leaves rows out, which {ROW_NUMBER} would count: declare a column with the time")
     return export
 
 
@@ -326,6 +332,9 @@ def _form(fields: Fields) -> SheetForm:
         raise fields.error("separator", f"must be one of {', '.join(SEPARATORS)}, or that character")
     if how.get("decimal") == how["separator"]:
         raise fields.error("decimal", "must be another character than the separator")
+    between = how.get("thousands")  # numbers in quotes may have the comma that separates cells
+    if between and (between == how.get("decimal", ".") or between == how["separator"] != ","):
+        raise fields.error("thousands", "must be another character than the decimal sign and the separator")
     try:
         "".encode(how.get("encoding", "utf-8"))
     except LookupError:

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from .errors import DatasetError
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NAMES_OF = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
+_BETWEEN_CELLS = "\x1f"  # of a workbook's row as text
 _HEAD = 1 << 18  # bytes in which a header has to be found
 _MAX_LISTED = 8
 _PLACE = re.compile(r"(?:(.+) )?\[([1-9]\d*)\]", re.ASCII)  # "X [2]", the second X; "[2]", the second of all
@@ -37,11 +38,13 @@ class SheetForm:
     given, in the rows up to the line whose first cell is this text; below them follow `units_rows` rows that are not
     data. Without rows of names, columns are known by their places, "[2]". `above`: cells that have to follow one
     another above the names, empty ones aside; `units_above`: the first cell of the last line above them that has units.
-    `encoding` is Python's name for it; `sheet` is the name or the place of a workbook's sheet."""
+    `thousands` separates groups of three digits. `encoding` is Python's name for it; `sheet` is the name or the place
+    of a workbook's sheet."""
 
     format: str = "csv"
     separator: str = ","
     decimal: str = "."
+    thousands: str | None = None
     encoding: str = "utf-8"
     skip_rows: int = 0
     header: str | None = None
@@ -71,6 +74,7 @@ class Sheet:
         self.names = [_parts(header, place) for place in range(width)]
         self.units = [tuple(filter(None, (_cell(row, place) for row in units))) for place in range(width)]
         self._refuse_other_separator()
+        self._refuse_numbers_as_units(units[len(units) - form.units_rows :])
 
     # -- reading ---------------------------------------------------------------------------------------------------
 
@@ -150,6 +154,8 @@ class Sheet:
         )
 
     def _cells(self, line: str, number: int | None = None) -> list[str]:
+        if self._form.format == "xlsx":
+            return line.split(_BETWEEN_CELLS)
         if self._form.separator == " ":
             return line.split()
         try:
@@ -162,7 +168,7 @@ class Sheet:
         place = _PLACE.fullmatch(sheet or "[1]")  # no sheet's name has brackets
         frame = _excel(self._path, int(place[2]) - 1 if place and not place[1] else sheet, self.file)
         rows = _texts(frame)
-        lines = [self._form.separator.join(row) for row in rows]
+        lines = [_BETWEEN_CELLS.join(row) for row in rows]
         begin, end = self._head(lines)
         return lines[:begin], rows[begin:end], frame.iloc[end:].reset_index(drop=True)
 
@@ -177,12 +183,8 @@ class Sheet:
         """Columns by position; numeric if pandas could read the whole column as numbers."""
         frame = self._rows if self._form.format == "xlsx" else self._parsed()
         width = len(self.names)
-        if self._form.format == "csv" and self._form.separator == " " and frame.shape[1] < width:
-            raise self.error(  # without a cell for each name, which one is missing is unknown
-                f"{frame.shape[1]} fields, but {width} names: blanks in the names? Skip them (skip_rows), and declare "
-                'header_rows = 0 and columns by their places, "[2]" for the second',
-                0,
-            )
+        if self._form.format == "csv" and self._form.separator == " ":
+            self._refuse_too_few(frame, width)
         if frame.shape[1] > width:
             beyond = frame.iloc[:, width:].notna().to_numpy().any(axis=1)
             if beyond.any():
@@ -190,6 +192,21 @@ class Sheet:
         empty = frame.isna().to_numpy().all(axis=1)
         last = len(frame) - int(np.argmin(empty[::-1])) if len(frame) and not empty.all() else 0
         return frame.iloc[:last]
+
+    def _refuse_too_few(self, frame: Any, width: int) -> None:
+        """Refuse a row of fewer fields than names, except an empty one: between blanks, an empty cell leaves no trace,
+        and those to its right would count as the columns before."""
+        if frame.shape[1] < width:
+            raise self.error(
+                f"{frame.shape[1]} fields, but {width} names: blanks in the names? Skip them (skip_rows), and declare "
+                'header_rows = 0 and columns by their places, "[2]" for the second',
+                0,
+            )
+        fields = frame.iloc[:, :width].notna().to_numpy().sum(axis=1)
+        if (short := np.flatnonzero((fields > 0) & (fields < width))).size:
+            row = int(short[0])
+            problem = f"{fields[row]} fields, but {width} columns: which of them is missing is unknown"
+            raise self.error(f"{problem}{self._below_a_gap(row) or '; export with another separator'}", row)
 
     def _parsed(self) -> Any:
         """The table as pandas reads it; if pandas fails or finds another number of lines than the file has (an unclosed
@@ -239,6 +256,14 @@ class Sheet:
                         "in numbers, or declare how it is written (bifa instrument)",
                         self.first - 1,
                     )
+
+    def _refuse_numbers_as_units(self, rows: Sequence[Sequence[str]]) -> None:
+        """Refuse a row of units that is a row of data, which would be lost."""
+        for at, row in enumerate(rows, self.first - len(rows)):
+            written = [cell.strip(BLANKS) for cell in row if cell.strip(BLANKS)]
+            if written and all(self._read(cell) is not None for cell in written):
+                problem = f"declared as units, but has numbers ({', '.join(written[:3])})"
+                raise self._error(f"{problem}: declare units_rows as one less, or 0 if the file has none", at)
 
     @property
     def _which(self) -> str:
@@ -304,10 +329,16 @@ class Sheet:
         written = map(self._written, range(len(self)))
         return [row[place] if place < len(row) else "" for row in written]
 
+    def _read(self, cell: str) -> float | None:
+        """The number in a cell as declared, or None."""
+        mark, between = self._form.decimal, self._form.thousands
+        if between is not None and _grouped(between).match(cell):
+            cell = cell.replace(between, "")
+        return number(cell if mark == "." else cell.replace(".", " ").replace(mark, "."))
+
     def _number(self, cell: str, row: int, name: str) -> float:
-        mark = self._form.decimal
         cell = cell.strip(BLANKS)
-        found = number(cell if mark == "." else cell.replace(".", " ").replace(mark, "."))
+        found = self._read(cell)
         if found is None and cell:
             problem = f"{_shown(cell)} is not a number{self._hint(cell) or self._below_a_gap(row)}"
             raise self.error(problem, row, name)
@@ -319,10 +350,10 @@ class Sheet:
         if decimal(cell.replace("," if mark == "." else ".", "").replace(mark, ".")) is None:
             return ""
         if mark == ",":
-            return '; decimal points, or points between thousands? Declare decimal = ".", or export without them'
+            return '; decimal points, or points between thousands? Declare decimal = ".", or thousands = "."'
         if cell.count(",") == 1 and "." not in cell:
             return '; a decimal comma? Write points, or declare decimal = ","'
-        return "; commas between thousands? Export numbers without them"
+        return '; commas between thousands? Declare thousands = ","'
 
     def error(self, problem: str, row: int | None = None, column: str | None = None) -> DatasetError:
         """Return an error located at a row of the data."""
@@ -354,6 +385,13 @@ class Sheet:
             f"; does another table begin below the empty line {line}? One table is read, the first or the one that "
             "header and above name: remove what is below it"
         )
+
+
+@cache
+def _grouped(between: str) -> re.Pattern[str]:
+    """Numbers whose integer digits are in groups of three."""
+    mark = re.escape(between)
+    return re.compile(rf"[+-]?[1-9]\d{{0,2}}({mark}\d{{3}})+(?!\d|{mark})", re.ASCII)
 
 
 def _exact() -> dict[str, str]:

@@ -36,6 +36,7 @@ _NAME_PATTERNS = {  # names that a column may have, in the languages of the pres
 _DAY = r"\d{1,4}[-/.](\d{1,2}|[a-z]{3})[-/.]\d{1,4}"
 _CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?( ?[ap]m)?(Z|[+-]\d\d:?\d\d)?"
 _IN_BRACKETS = re.compile(r"\(.*\)|\[.*\]")
+_OTHER_UNITS = {"v", "mv", "volt", "volts", "%", "mm/mm", "°"}
 _MOMENT = re.compile(rf"{_DAY}([T ]+{_CLOCK})?|{_CLOCK}", re.ASCII | re.IGNORECASE)
 
 
@@ -56,8 +57,8 @@ class Look:
     def guess(self, name: str) -> str | None:
         """Guess which column may be `name` of the data set; None if no name fits."""
         for pattern in _NAME_PATTERNS["time_s" if name == "time_s" else name.split("_")[0]]:
-            for label in self.sheet.labels():
-                if re.search(pattern, label, re.IGNORECASE):
+            for place, label in enumerate(self.sheet.labels()):
+                if re.search(pattern, label, re.IGNORECASE) and any(self.sheet.cells(place)[:ROWS_SHOWN]):
                     return label if self.sheet.has(label) else f"{label} [1]"
         return None
 
@@ -112,7 +113,7 @@ def _workbook(path: Path) -> dict[str, Any]:
     _refuse_short(path, run)
     place = found.index(best) + 1
     how = {"format": "xlsx"} | ({"sheet": f"[{place}]"} if place > 1 else {})
-    return how | _heads(cells[:first], len(cells[first]))
+    return how | _heads(cells[:first], cells[first], ".")
 
 
 def _text(path: Path) -> dict[str, Any]:
@@ -127,10 +128,10 @@ def _text(path: Path) -> dict[str, Any]:
                 best = max(best, (run, share, -first, name, decimal), key=lambda one: one[:3])
     run, first, separator, decimal = best[0], -best[2], *best[3:]
     _refuse_short(path, run)
-    cells = [_split(line, SEPARATORS[separator]) for line in lines[:first]]
+    cells = [_split(line, SEPARATORS[separator]) for line in lines[: first + 1]]
     how: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
     how = {key: value for key, value in how.items() if value not in ("comma", ".", "utf-8")}
-    return how | _heads(cells, len(_split(lines[first], SEPARATORS[separator])), by_blanks=separator == "space")
+    return how | _heads(cells[:-1], cells[-1], decimal, by_blanks=separator == "space")
 
 
 def _refuse_short(path: Path, run: int) -> None:
@@ -187,17 +188,28 @@ def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
     """Share of numbers and dates among the non-empty cells; 0 if there are fewer than two."""
     written = [cell for cell in cells if cell.strip()]
-    found = sum(_is_number(cell, decimal) or _MOMENT.fullmatch(cell.strip()) is not None for cell in written)
+    found = sum(_is_datum(cell, decimal) for cell in written)
     return found / len(written) if len(written) > 1 else 0.0
+
+
+def _is_datum(cell: str, decimal: str) -> bool:
+    return _is_number(cell, decimal) or _MOMENT.fullmatch(cell.strip()) is not None
 
 
 def _is_number(cell: str, decimal: str) -> bool:
     return number(cell if decimal == "." else cell.replace(".", " ").replace(",", ".")) is not None
 
 
-def _heads(above: Sequence[Sequence[str]], width: int, by_blanks: bool = False) -> dict[str, Any]:
-    """Keys that declare the rows of names, and of units, right above the numbers and empty rows. `by_blanks`: columns
-    are separated by blanks, as are the words of a name, so only a row of `width` words can be names."""
+def _heads(
+    above: Sequence[Sequence[str]], first: Sequence[str], decimal: str, by_blanks: bool = False
+) -> dict[str, Any]:
+    """Keys that declare the rows of names, and of units, above the `first` row of numbers and empty rows. `by_blanks`:
+    columns are separated by blanks, as are the words of a name, so only a row of as many words can be names. Rows that
+    have numbers below one another (beside a preamble, or with a missing value) are data as well."""
+    width, begin = len(first), len(above)
+    while begin and _has_same_numbers(above[begin - 1], first, decimal):
+        begin -= 1
+    above = above[:begin]
     empty = next((n for n, row in enumerate(reversed(above)) if any(cell.strip() for cell in row)), len(above))
     heads: list[Sequence[str]] = []
     for row in reversed(above[: len(above) - empty]):
@@ -223,10 +235,19 @@ def _heads(above: Sequence[Sequence[str]], width: int, by_blanks: bool = False) 
     return how
 
 
+def _has_same_numbers(row: Sequence[str], other: Sequence[str], decimal: str) -> bool:
+    """Whether two rows of equal length both have numbers or dates in at least two of their columns."""
+    both = (all(_is_datum(cell, decimal) for cell in pair) for pair in zip(row, other, strict=False))
+    return len(row) == len(other) and sum(both) > 1
+
+
 def _is_of_units(row: Sequence[str]) -> bool:
     written = [cell.strip() for cell in row if cell.strip()]
     alone = [cell.strip("()[] ") for cell in written]  # "Time [s]" is a name
-    return all(map(_IN_BRACKETS.fullmatch, written)) or sum(map(bool, map(unit_in, alone))) > len(written) / 2
+    return (
+        all(map(_IN_BRACKETS.fullmatch, written))
+        or sum(unit_in(cell) is not None or cell.lower() in _OTHER_UNITS for cell in alone) > len(written) / 2
+    )
 
 
 def _preset(path: Path, role: str) -> str | None:

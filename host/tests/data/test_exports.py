@@ -194,6 +194,7 @@ COUNTED = named("[0]").replace('time_s = "s"', 'time_s = "frame"') + "rate_hz = 
 UNITS = "but units.force_N is declared as N"
 FIELDS = r"line {}: 4 fields, but 3 columns \({} is under none\); "
 ROWS = "t,x,F\n0,1,2\n1,2,3\n"
+SPACES = 'separator = "space"\n'
 COMMAS = 'separator = ";"\ndecimal = ","\n'
 READ = {
     "a run that is shorter than its neighbor in the sheet ends where it ends": (
@@ -230,6 +231,16 @@ READ = {
         "t,x,F\n,1,2\n,2,3\n,3,4\n",
         COUNTED,
         [[0.0, 0.02, 0.04], [1.0, 2.0, 3.0], [2.0, 3.0, 4.0]],
+    ),
+    "groups of three digits, as Bluehill writes them": (
+        't,x,F\n"0.5","-1,234.5","1,234,567"\n"1,000.5","12.5","-999.9"\n',
+        SIMPLE + 'thousands = ","\n',
+        [[0.5, 1000.5], [-1234.5, 12.5], [1234567.0, -999.9]],
+    ),
+    "points between groups of digits": (
+        "t;x;F\n0,0;1.234,5;2\n1,0;2,5;3.000\n",
+        SIMPLE + COMMAS + 'thousands = "."\n',
+        [[0.0, 1.0], [1234.5, 2.5], [2.0, 3000.0]],
     ),
     "columns under their own names need no declaration": (
         "time_s;displacement_mm;force_N\n0,0;1,5;-2,5\n0,1;1,6;-2,4\n",
@@ -279,6 +290,9 @@ def test_a_workbook_comes_in(tmp_path):
     table.to_excel(path, sheet_name="data", index=False, startrow=2)
     with pytest.raises(DatasetError, match=r"a\.xlsx, line 5, column x: 'n\.a\.' is not a number"):
         read_export(path, export, MACHINE)
+    table.rename(columns={"t": "t, s"}).to_excel(path, index=False)
+    comma = declared(named("t, s", "F", "F [1]").replace("F [1]", "x") + 'format = "xlsx"\nheader = "t, s"\n')
+    assert read_export(path, comma, ["time_s"])[0]["time_s"].tolist() == [0.0, 0.1]
     path.write_bytes(b"no workbook")
     with pytest.raises(DatasetError, match="cannot be read as a workbook"):
         read_export(path, export, MACHINE)
@@ -301,6 +315,8 @@ def test_a_workbook_comes_in(tmp_path):
             SIMPLE,
             r"line 3, column x: '1,234\.5' is not a number; commas between thousands\?",
         ),
+        ('t,x,F\n0,1,2\n1,"1,23",3\n', SIMPLE + 'thousands = ","\n', r"line 3, column x: '1,23' is not a number"),
+        ('t,x,F\n0,1,2\n1,"0,123",3\n', SIMPLE + 'thousands = ","\n', r"line 3, column x: '0,123' is not a number"),
         (
             "t;x;F\n0,0;1.234;2\n1,0;2,5;3\n",
             SIMPLE + COMMAS,
@@ -311,6 +327,10 @@ def test_a_workbook_comes_in(tmp_path):
             named("Time", "Disp", "T") + 'separator = "space"\n',
             r"line 2: 4 fields, but 6 names: blanks in the names\?.*\[2\]",
         ),
+        ("t x F\n0 1 2\n1   3\n2 3 4\n", SIMPLE + SPACES, r"line 3: 2 fields, but 3 columns: which of them is missing"),
+        (ROWS, SIMPLE + "units_rows = 1\n", r"line 2: declared as units, but has numbers \(0, 1, 2\)"),
+        ("t,x,Kraft / kN\n0,1,2\n", named(force="Kraft / kN"), "the file says kN, " + UNITS),
+        ("t,x,load, kN\n".replace("load, kN", '"load, kN"') + "0,1,2\n", named(force="load, kN"), "kN, " + UNITS),
         ("t,x,F\n(s),(mm),(kN)\n0,1,2\n", SIMPLE + "units_rows = 1\n", "line 2, column F: the file says kN, " + UNITS),
         ("t,x,F (kN) Run #1\n0,1,2\n", named(force="F (kN) Run #1"), "the file says kN, " + UNITS),
         ("t,x,F (lbs)\n0,1,2\n", named(force="F (lbs)"), "the file says lbf, " + UNITS),
@@ -422,6 +442,8 @@ def test_an_export_that_states_another_rate_or_unit_than_its_preset_is_refused(
         (SIMPLE + 'encoding = "latin1-de"\n', r"encoding: 'latin1-de' is unknown"),
         (SIMPLE + 'separator = "|"\n', r"separator: must be one of comma"),
         (SIMPLE + 'decimal = ","\n', r"decimal: must be"),
+        (SIMPLE + 'thousands = "."\n', r"thousands: must be another character"),
+        (COUNTED + "where = { body = 1 }\n", r"where: leaves rows out, which \[0\] would count"),
         (SIMPLE + "sign = { force_N = 2 }\n", r"sign: force_N must be 1 or -1"),
         (SIMPLE.replace('"F"', '"x"'), r"line 2, .*columns: displacement_mm and force_N are both 'x': only one can be"),
         (SIMPLE + 'zone = "Berlin"\n', r"zone: unknown time zone 'Berlin'"),
@@ -450,6 +472,7 @@ def test_a_declaration_that_is_wrong_is_named_by_line_and_key(text, said):
             ("micron", "um"),
             ("Meter", "m"),
             ("MM", "mm"),
+            ("MN", None),
             ("(KPA)", "kPa"),
             ("cmh2o", "cmH2O"),
             ("Run (S)", None),

@@ -167,6 +167,13 @@ ROWS = "0,1,5\n1,2,6\n2,3,7\n"
         (f"t,x,F\n{ROWS}".replace("\n", "\r\r\n"), {}, ["t", "x", "F"]),
         (f"X,CH1,CH2,Start,Increment,\n{ROWS}", {}, ["X", "CH1", "CH2", "Start", "Increment", "[6]"]),
         ("Time (s) x F\n" + ROWS.replace(",", " "), {"separator": "space", "header_rows": 0, "skip_rows": 1}, None),
+        (  # a preamble beside the samples (Tektronix), and values missing in the first row
+            "Length,2500,,-1e-6,1\n,,,0,2\n,,,1e-6,3\n",
+            {"header_rows": 0},
+            ["[1]", "[2]", "[3]", "[4]", "[5]"],
+        ),
+        ("n,t,x,F\n0,0,none,---\n1,1,1,5\n2,2,2,6\n", {}, ["n", "t", "x", "F"]),
+        ("x-axis,1,2\nsecond,Volt,Volt\n" + ROWS, {"units_rows": 1}, ["x-axis", "1", "2"]),
         ("t,x\n" + "".join(f"2026-11-25 10:00:0{k}.5 PM,{k}\n" for k in range(3)), {}, ["t", "x"]),
     ],
 )
@@ -186,10 +193,12 @@ def test_every_row_of_numbers_is_seen_and_none_taken_for_names(tmp_path, text, h
         ("Crosshead absolute,Standard travel", "displacement_mm", "Standard travel"),
         ("C_1_Force[kN],C_1_Déplacement[mm]", "displacement_mm", "C_1_Déplacement[mm]"),
         ("Force,Force", "force_N", "Force [1]"),
+        ("X_Value,Time,Force", "time_s", "Time"),
     ],
 )
 def test_the_better_of_two_names_is_proposed(tmp_path, names, name, label):
-    (tmp_path / "a.csv").write_text(names + "\n0,1\n1,2\n", encoding="utf-8")
+    rows = "0,1\n1,2\n" if names.count(",") == 1 else ",0,1\n,1,2\n"
+    (tmp_path / "a.csv").write_text(f"{names}\n{rows}", encoding="utf-8")
     assert look(tmp_path / "a.csv").guess(name) == label
 
 
