@@ -494,7 +494,9 @@ def segments(data: Any, count: int = 10) -> list[Table]:
         raise RecordError(f"record {table.name}: {count!r} segments: give a whole number, 3 or more.")
     ends = np.linspace(0, len(table.time_s), count + 1).astype(int)
     if len(table.time_s) < count * _MIN_SAMPLES:
-        raise RecordError(f"record {table.name} has {len(table.time_s)} samples: too few for {count} segments.")
+        most = len(table.time_s) // _MIN_SAMPLES
+        can = f"at most {most}" if most >= 3 else f"at least {3 * _MIN_SAMPLES} samples are needed for three"
+        raise RecordError(f"record {table.name} has {len(table.time_s)} samples: too few for {count} segments, {can}.")
     found = []
     for place, (first, last) in enumerate(pairwise(ends)):
         name = _part(table, f"segment {place + 1}")

@@ -21,7 +21,8 @@ def differ(a: np.ndarray, b: np.ndarray, limit: float) -> bool:
     if (np.isfinite(a) != np.isfinite(b)).any():
         return True
     known = np.isfinite(a)
-    return bool(known.any() and np.sqrt(np.mean((a[known] - b[known]) ** 2)) > limit)
+    with np.errstate(over="ignore"):
+        return bool(known.any() and np.sqrt(np.mean((a[known] - b[known]) ** 2)) > limit)
 
 
 def changed(found: Channels, before: Channels, trial: Record, share: float) -> str | None:

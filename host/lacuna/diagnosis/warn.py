@@ -63,8 +63,8 @@ def explains_too_little(choice: Choice, split: Split, tested: float | None, poli
 
 
 def doubts(choice: Choice, split: Split, tested: float | None) -> list[str]:
-    """Warnings for named effects: a larger explanation has more weight, or there is only one final trial. `tested`: the
-    share of the gap that the effects close on the final trials; None without a gap."""
+    """Warnings for named effects: a larger explanation has more weight, or there are fewer than two final trials.
+    `tested`: the share of the gap that the effects close on the final trials; None without a gap."""
     said = []
     likeliest, weight = max(choice.weights.items(), key=lambda found: found[1])
     if weight > 0.5 and frozenset(likeliest) > frozenset(choice.candidate.effects):
@@ -73,6 +73,8 @@ def doubts(choice: Choice, split: Split, tested: float | None) -> list[str]:
             f"With {listed(further)} added the explanation would have more weight ({weight:.2f}), but that closes too"
             " little of what is left to be named, or helps too little on records that were not fitted."
         )
+    if not split.final:
+        said.append("No record was left to test these effects: with further records, or repeats, some would be.")
     if tested is not None and len(split.final) == 1:
         said.append(f"The shares of the gap rest on a single test record, {split.final[0].name}.")
     return said

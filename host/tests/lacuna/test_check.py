@@ -371,6 +371,14 @@ def test_warns_of_trials_that_the_model_cannot_predict():
 
 
 @pytest.mark.slow
+def test_warns_of_effects_that_no_record_was_left_to_test():
+    three = dict(list(heater.records(repeats=1, seed=3, offset__power_W=2.0).items())[:3])
+    verdict = lacuna.diagnose(heater.system(), three, progress=False)
+    assert [effect.name for effect in verdict.effects] == ["offset"]
+    assert any(said.startswith("No record was left to test these effects") for said in verdict.warnings)
+
+
+@pytest.mark.slow
 def test_warns_of_a_parameter_at_its_bound():
     tight = (Parameter("gain_K_W", "K/W", 0.5, 0.1, 0.7), heater.PARAMETERS[1])
     assert "gain_K_W is at its bound (0.7 K/W)" in warned(declared(parameters=tight, effects=heater.EFFECTS))

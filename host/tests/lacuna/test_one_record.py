@@ -146,8 +146,12 @@ def test_a_segment_is_the_end_of_a_run_from_the_beginning():
 def test_too_short_a_record_is_refused():
     with pytest.raises(RecordError, match="too short for three windows"):
         lacuna.windows(record(8, samples=600), 150.0)
-    with pytest.raises(RecordError, match="too few for 100 segments"):
+    with pytest.raises(RecordError, match="too few for 100 segments, at most 75"):
         lacuna.segments(record(8, samples=600), 100)
+    with pytest.raises(
+        RecordError, match="23 samples: too few for 10 segments, at least 24 samples are needed for three"
+    ):
+        lacuna.segments(record(8, samples=23))
     with pytest.raises(RecordError, match="one long record"):
         lacuna.segments([record(8), record(9)])
 
