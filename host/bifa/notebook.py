@@ -66,7 +66,7 @@ class Robot:
         """Return the robot completed by a verdict: with its fitted values, effects and learnt curves."""
         from bifa.identify.completed import completed_model
 
-        return Robot(completed_model(verdict.diagnosis.final))
+        return Robot(completed_model(verdict.diagnosis.told))
 
     def optimize(self, *, robust: bool = True, seed: int = 0, evaluations: int | None = None) -> Optimum:
         """Find the fastest gait on this robot or, if `robust`, on nine in ten robots like it; returns a

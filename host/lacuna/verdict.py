@@ -92,8 +92,8 @@ class Verdict:
     - `error`: RMS error on held-out records, in units of the noise, as a dict of "before", "after" and "floor".
     - `warnings`: what to bear in mind, as sentences.
     - `theta`, `model`, `nuisances`: the completed model's parameters; that model as a function (`CompletedModel`); the
-      nuisances fitted to each record. For a model given as a function, all three come from a fit to every record, made
-      after the errors were computed.
+      nuisances fitted to each record. All three come from the fit that is reported: for a model given as a function, to
+      every record, made after the errors were computed.
     - `record`: everything in plain types, for JSON. `diagnosis`: the engine's complete result.
 
     `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws a figure, `to_frame` returns tables,
@@ -103,7 +103,7 @@ class Verdict:
     def __init__(self, system: System, diagnosis: Diagnosis):
         self.system, self.diagnosis = system, told(system, diagnosis)
         self.verdict, self.effects, self.warnings = diagnosis.verdict, self.diagnosis.effects, diagnosis.warnings
-        fitted = diagnosis.told if isinstance(system, FunctionSystem) else diagnosis.final
+        fitted = diagnosis.told
         self.model = CompletedModel(system, fitted)
         self.theta = self.model.theta
         problem, point = fitted.problem, fitted.solution.point

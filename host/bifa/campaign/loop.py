@@ -204,7 +204,7 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
         (outputs / "diagnosis.json").write_text(json.dumps(record, indent=1) + "\n")
         (outputs / "errors.json").write_text(json.dumps(prediction_errors(found), indent=1) + "\n")
         (outputs / "residuals.json").write_text(json.dumps(residuals(found, labels_of(dataset))) + "\n")
-        save_model(outputs / "model-completed.toml", completed_model(found.final))
+        save_model(outputs / "model-completed.toml", completed_model(found.told))
 
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
     settings = setup.settings(_SEPARATING_STAGE)
@@ -214,7 +214,7 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
 
 def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: OnProgress) -> Stage:
     def complete(dataset: Dataset, suspected: tuple[str, ...]) -> Model:
-        return completed_model(_run_diagnosis(setup, on_progress, dataset, suspected).final)
+        return completed_model(_run_diagnosis(setup, on_progress, dataset, suspected).told)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)

@@ -152,7 +152,7 @@ def _report(
     record, labels = as_record(found), labels_of(measured)
     print_diagnosis(console, record, labels)
     if model is not None:
-        save_model(model, completed_model(found.final, date.today().isoformat()))
+        save_model(model, completed_model(found.told, date.today().isoformat()))
         command = f"bifa optimize --model {quote(str(model))} --out gait.toml"
         console.print(f"model: {model}. Next: {command}", soft_wrap=True)
     if json is not None:

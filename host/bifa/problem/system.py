@@ -127,6 +127,7 @@ class RobotSystem(System):
         return self.predict_trials([theta], effects, [trial], coarse=coarse, corrections=[corrections])[0]
 
     forks = True  # the compiled code has neither threads nor state
+    tells_of_all = True
 
     @property
     def at_once(self) -> int:  # type: ignore[override]  # a property, since the call may compile

@@ -43,8 +43,8 @@ class Diagnosis:
     "unexplained" (something matters and no mechanism is supported). `base`, `explained` and `final` are fitted to all
     known trials: the base model, the base model with the named effects, and the latter with the `learnt` curves that
     held up on the final trials. `base_parameters`: the base model's parameters fitted jointly with the named effects;
-    empty if the data remain unexplained. `told`: the fit that reported parameters, intervals and warnings come from;
-    for a model given as a plain function it is fitted to every trial. `signature`: where the residual of the base model
+    empty if the data remain unexplained. `told`: the fit that reported parameters, intervals and warnings come from,
+    to every trial if the system sets `tells_of_all`. `signature`: where the residual of the base model
     lies and what it depends on; `left`, `left_signature`: the same of what the named effects (or the base model) leave;
     `left_share`: relative to the base model's gap.
     """

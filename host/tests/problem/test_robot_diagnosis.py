@@ -81,7 +81,8 @@ def test_names_sizes_and_adds_an_effect_that_nobody_declared(tmp_path, effect, p
     assert found.effects[0].parameters[parameter] == pytest.approx(truth[effect][parameter], rel=0.1)
     assert found.before.held_out > 1.5 * found.floor.held_out
     assert found.after.held_out < 1.1 * found.floor.held_out
-    model = completed_model(found.final)
+    assert len(found.final.problem.trials) < len(found.told.problem.trials) == 45, "once errors are computed, all tell"
+    model = completed_model(found.told)
     assert model.effects[effect][parameter] == pytest.approx(found.effects[0].parameters[parameter], rel=0.02)
     assert f"{effect}.{parameter}" in model.covariance.names
 
