@@ -35,6 +35,16 @@ def check_targets(
     None is skipped, so that a command can pass its options unchanged. Files of a data set, and `inputs`, which the same
     command reads, must not be replaced, and no two targets may be the same.
     """
+    try:
+        _check_targets(files, folders, inputs)
+    except OSError as error:  # too long a name, a working folder that is gone
+        place = error.filename or "the working folder"
+        raise TargetError(f"{place} cannot be used ({error.strerror}); choose another place") from None
+
+
+def _check_targets(
+    files: tuple[Path | None, ...], folders: tuple[Path | None, ...], inputs: tuple[Path | None, ...]
+) -> None:
     read = {path.resolve() for path in inputs if path is not None}
     targets, made = ([path for path in paths if path is not None] for paths in (files, folders))
     _refuse_same(targets, made)
@@ -49,7 +59,7 @@ def check_targets(
             raise TargetError(f"{path} is an input of this command; choose another file for its output")
         if path.exists() and (parent / "dataset.toml").exists():
             raise TargetError(f"{path} belongs to a data set, which is never overwritten; choose another place")
-        _check_writable(parent, path)
+        _check_writable(parent, path, _aside(path))
     for path in made:
         there = path.resolve()
         while not there.exists():
@@ -75,12 +85,17 @@ def _refuse_irregular(path: Path) -> None:
         raise TargetError(f"{path} is a pipe or a device, not a regular file; write to a file first")
 
 
-def _check_writable(folder: Path, asked: Path) -> None:
-    """Test by writing: permissions do not reveal a full disk or a read-only mount."""
+def _check_writable(folder: Path, asked: Path, aside: Path | None = None) -> None:
+    """Test by writing: permissions do not reveal a full disk, a read-only mount or too long a name. `aside`: the file
+    that is written at first, if it is known."""
     try:
         if asked.exists() and not os.access(asked, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-        tempfile.TemporaryFile(dir=folder).close()
+        if aside is not None:
+            aside.touch()
+            aside.unlink()
+        else:
+            tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
         raise TargetError(f"{asked} cannot be written ({error.strerror}); choose another place") from None
 
@@ -104,6 +119,11 @@ def named(path: Path) -> Path:
     return path if path.name else path.resolve()
 
 
+def _aside(target: Path) -> Path:
+    """Name of a new file beside `target`."""
+    return target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+
+
 @contextmanager
 def written(path: str | os.PathLike[str]) -> Iterator[Path]:
     """`with written(path) as aside:` write to `aside`, a file beside `path`; after the block it replaces `path`, or the
@@ -115,7 +135,7 @@ def written(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     _refuse_irregular(target)
     target = target.resolve() if target.is_symlink() else target
-    aside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    aside = _aside(target)
     try:
         yield aside
         with aside.open("r+b") as file:  # Windows syncs only files opened for writing
@@ -124,7 +144,8 @@ def written(path: str | os.PathLike[str]) -> Iterator[Path]:
     except OSError as error:
         raise TargetError(f"{target} cannot be written ({error.strerror or error})") from None
     finally:
-        aside.unlink(missing_ok=True)
+        with suppress(OSError):  # a name too long, for instance, which was reported above
+            aside.unlink(missing_ok=True)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

@@ -82,6 +82,16 @@ def test_targets_are_refused_before_work(tmp_path):
         check_targets(tmp_path)
     with pytest.raises(TargetError, match="is a file, so "):
         check_targets(folders=(tmp_path / "file" / "pictures",))
+    for letters in (248, 300):  # the file that is written at first has a longer name than the target
+        for place in ({}, {"folders": (tmp_path / ("d" * 300),)}):
+            with pytest.raises(TargetError, match=r"\(File name too long\); choose another place"):
+                check_targets(tmp_path / ("n" * letters + ".toml"), **place)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_name_that_is_too_long_is_told_by_the_writer_too(tmp_path):
+    with pytest.raises(TargetError, match="File name too long"):
+        write_text(tmp_path / ("n" * 248 + ".toml"), "model\n")
 
 
 @needs_pipes

@@ -141,7 +141,7 @@ def diagnose(
 def _report(
     console: Console, measured: Dataset, found: Diagnosis, json: Path | None, model: Path | None, page: Path | None
 ) -> None:
-    """Print the diagnosis, and write the files that were asked for."""
+    """Write the files that were asked for, then print the diagnosis: output that nobody reads must not lose it."""
     from bifa.data.dataset import labels_of
     from bifa.identify.completed import completed_model
     from bifa.report.diagnosis import diagnosis_page
@@ -150,15 +150,17 @@ def _report(
     from lacuna.diagnosis.record import as_record
 
     record, labels = as_record(found), labels_of(measured)
-    print_diagnosis(console, record, labels)
-    if model is not None:
-        save_model(model, completed_model(found.told, date.today().isoformat()))
-        command = f"bifa optimize --model {quote(str(model))} --out gait.toml"
-        console.print(f"model: {model}. Next: {command}", soft_wrap=True)
     if json is not None:
         write_text(json, dumps(record, indent=2) + "\n")
+    if model is not None:
+        save_model(model, completed_model(found.told, date.today().isoformat()))
     if page is not None:
         write_page(diagnosis_page(measured.name, record, labels, _curves(found, labels)), page)
+    print_diagnosis(console, record, labels)
+    if model is not None:
+        command = f"bifa optimize --model {quote(str(model))} --out gait.toml"
+        console.print(f"model: {model}. Next: {command}", soft_wrap=True)
+    if page is not None:
         console.print(f"report: {page}")
 
 

@@ -55,17 +55,19 @@ def fit(
             date=date.today().isoformat(),
             on_progress=lambda stage: progress.update(task, description=stage),
         )
-    save_model(out, found.model)
-    print_sections(console, parameters_and_remarks(found))
-    print_table(console, errors_table(found))
+    save_model(out, found.model)  # what was asked for is written first: output that nobody reads must not lose it
     if report is not None:
         from bifa.report.page import write_page
 
         write_page(fit_page(found), report)
-        console.print(f"report: {report}")
     if pictures is not None:
         with written_into(pictures) as aside:
             draw_curves(found, aside)
+    print_sections(console, parameters_and_remarks(found))
+    print_table(console, errors_table(found))
+    if report is not None:
+        console.print(f"report: {report}")
+    if pictures is not None:
         console.print(f"pictures: {pictures}")
     quoted = shlex.quote(str(out))
     console.print(

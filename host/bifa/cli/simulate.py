@@ -102,6 +102,14 @@ def simulate(
         progress = speeds(chosen, gait_rows([file.gait]), cycles, 1e-6, **place)
     if not (np.isfinite(record["displacement_head_mm"]).all() and np.isfinite(progress.advance_m).all()):
         raise SimulationError(f"{chosen.name} cannot be simulated: a curve or a value is unlike any robot's")
+    if out:
+        write_csv(out, record.columns)
+    if pictures:
+        from bifa.report.walks import SIMULATED, Walk, draw_walks
+
+        title = f"{chosen.name}, {progress.speed_mm_s[0]:.1f} mm/s"
+        with written_into(pictures) as aside:
+            draw_walks([Walk(title, file.gait.period_s, {SIMULATED: record.columns})], aside / "walk.png")
     _print_walk(console, chosen, file.gait, progress)
     if ahead:
         _print_passing(console, passing(chosen, file.gait, ahead, supports, inclination))
@@ -114,14 +122,8 @@ def simulate(
         console.print(f"predicted, 90 %: {prediction.text}")
         console.print(f"what is known: {known.text}")
     if out:
-        write_csv(out, record.columns)
         console.print(f"channels: {out}")
     if pictures:
-        from bifa.report.walks import SIMULATED, Walk, draw_walks
-
-        title = f"{chosen.name}, {progress.speed_mm_s[0]:.1f} mm/s"
-        with written_into(pictures) as aside:
-            draw_walks([Walk(title, file.gait.period_s, {SIMULATED: record.columns})], aside / "walk.png")
         console.print(f"picture: {pictures / 'walk.png'}")
 
 

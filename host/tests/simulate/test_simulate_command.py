@@ -144,3 +144,11 @@ def test_of_few_cycles_nothing_is_said_to_be_unsettled(monkeypatch, cycles, word
     """A gait that never settles is called so only after enough cycles."""
     monkeypatch.setattr("bifa.gait.settling.WITHIN", -1.0)
     assert words in _words(_run("--cycles", cycles))
+
+
+def test_output_that_nobody_reads_does_not_lose_the_files(tmp_path, monkeypatch):
+    monkeypatch.setattr("bifa.cli.simulate._print_walk", Mock(side_effect=BrokenPipeError))
+    files = tmp_path / "walk.csv", tmp_path / "pictures"
+    assert _run("--cycles", 3, "--out", files[0], "--pictures", files[1]).exit_code != 0
+    assert files[0].exists()
+    assert (files[1] / "walk.png").exists()
