@@ -57,6 +57,11 @@ def serve(
 def _check_link(link: Path) -> None:
     if link.exists() and not link.is_symlink():
         raise VirtualRobotError(f"{link} exists and is not a symbolic link; choose another name for the link")
+    if link.exists():  # a link that a killed rig has left points nowhere, or to a terminal of somebody else
+        raise VirtualRobotError(
+            f"{link} leads to {os.readlink(link)}, perhaps of another rig: end that one, choose another name for the "
+            "link, or remove it"
+        )
     check_place(link, "the link")
 
 

@@ -13,6 +13,7 @@ import pytest
 import serial
 
 from harness.waiting import until
+from virtual_robot.errors import VirtualRobotError
 from virtual_robot.rig import open_rig
 
 pytestmark = [pytest.mark.uno, pytest.mark.real_time]
@@ -63,6 +64,14 @@ def test_a_reader_that_stops_reading_does_not_stall_the_bench(rig, serve):
         assert until(lambda: status[-1]["time_s"] > now)
     finally:
         os.close(file)
+
+
+def test_a_second_rig_does_not_take_the_link_of_the_first(rig, serve):
+    link, _ = serve(rig)
+    port = os.readlink(link)
+    with pytest.raises(VirtualRobotError, match=rf"leads to {port}, perhaps of another rig"):
+        rig.serve_pty(print, link=link, stop=lambda: True)
+    assert os.readlink(link) == port
 
 
 GREET = "int main(void) { serial(); for (;;) { put('H'); put('i'); put('\\n'); _delay_ms(20); } }"
