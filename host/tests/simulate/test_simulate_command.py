@@ -147,7 +147,7 @@ def test_of_few_cycles_nothing_is_said_to_be_unsettled(monkeypatch, cycles, word
 
 
 def test_output_that_nobody_reads_does_not_lose_the_files(tmp_path, monkeypatch):
-    monkeypatch.setattr("bifa.cli.simulate._print_walk", Mock(side_effect=BrokenPipeError))
+    monkeypatch.setattr("bifa.gait.predict_speed", Mock(side_effect=BrokenPipeError))
     files = tmp_path / "walk.csv", tmp_path / "pictures"
     assert _run("--cycles", 3, "--out", files[0], "--pictures", files[1]).exit_code != 0
     assert files[0].exists()
