@@ -28,6 +28,7 @@ from lacuna.records import Table, read
 from lacuna.system import Record, System, several
 from lacuna.verdict import Verdict
 
+_MAX_NOISE_RATIO = 4.0  # of declared noise to the residual: a fit absorbs less than that even of few samples
 _MOST = 0.5  # of the residual variance: a dependence that a verdict `none` does not hide
 
 _log = logging.getLogger("lacuna")
@@ -188,6 +189,7 @@ def _with_residual_warnings(
             f" ({floor:.3g}){doubt}. They were compared at a floor of {noise.sd:.3g}, a fraction of the best one's"
             " residual."
         )
+    doubted += _noise_declared_too_large(found, system)
     left_s = residual_correlation_s(found) if found.left.matters and not raised else {}
     advised = {
         channel: float(f"{seconds:.2g}")
@@ -225,6 +227,17 @@ def _with_residual_warnings(
             if d.share > _MOST
         ]
     return replace(found, warnings=(*doubted, *found.warnings, *said))
+
+
+def _noise_declared_too_large(found: Diagnosis, system: System) -> list[str]:
+    """Warnings for declared noise that the residual refutes: it hides whatever is missing below it."""
+    left = residual_rms(found)
+    return [
+        f"{channel}{within(experiment, (e for e, _ in left))} is predicted to within {left[experiment, channel]:.2g}"
+        f" (RMS), though noise of {declared:.3g} is declared, which hides everything smaller: correct sensor_noise."
+        for experiment, channel in left
+        if (declared := system.sensor_noise(experiment, channel)) > _MAX_NOISE_RATIO * left[experiment, channel]
+    ]
 
 
 def _white(found: Diagnosis, left_s: Mapping[str, float]) -> dict[str, float]:

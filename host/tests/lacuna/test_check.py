@@ -408,6 +408,14 @@ def test_warns_of_a_nuisance_at_its_limit():
     assert said in " ".join(lacuna.diagnose(system, records, progress=False).warnings)
 
 
+@pytest.mark.parametrize(("declared_K", "doubted"), [(50.0, True), (2.0 * heater.NOISE_K, False)])
+def test_warns_of_declared_noise_that_the_residual_refutes(declared_K, doubted):
+    system = heater.system(sensor_noise={"temperature_K": declared_K})
+    found = lacuna.diagnose(system, heater.records(repeats=2, seed=3, offset__power_W=2.0), progress=False)
+    assert any("noise of 50 is declared, which hides everything smaller" in w for w in found.warnings) == doubted
+    assert (found.verdict == "none") == doubted
+
+
 @pytest.mark.slow
 def test_warns_of_an_effect_that_would_need_the_opposite_sign():
     """The hidden offset is a loss of power; the library offers only a gain."""
