@@ -215,12 +215,13 @@ def _verify(console: Console, file: Path, role: str, table: dict[str, Any]) -> N
     """Read the file as declared, and print what it contains; raises DatasetError if that fails."""
     import numpy as np
 
-    from bifa.data.export import read_export
+    from bifa.data.export import read_export, refuse_falling
     from bifa.measure.propose import parsed, wanted
 
     export = parsed(role, table)
     named = table.get("columns", export.columns)
-    columns, _, rows = read_export(file, export, [n for n in wanted(role) if n in named])
+    columns, sheet, rows = read_export(file, export, [n for n in wanted(role) if n in named])
+    refuse_falling(columns["time_s"], sheet, rows, export)
     step_s = float(np.median(np.diff(columns["time_s"]))) if len(rows) > 1 else np.nan
     console.print(f"\nRead as declared: {len(rows)} rows, one every {1e3 * step_s:.3g} ms.")
     for name, values in columns.items():

@@ -20,7 +20,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -71,10 +71,17 @@ _KEYS += ("rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]")
 _BEHIND = re.compile(r".*?(\S+?)\s*[/,]\s*([^/,]+)")
 _FRACTION = re.compile("[.,]%f")  # in the form of a date
+_BELOW_MICROSECONDS = re.compile(r"(?<=[.,]\d{6})\d+", re.ASCII)
+_CLOCK = re.compile("%([HM])([^%])(?:[^%]|%[MSf])*")  # the form of a time without a date
 _YEAR_OF_TIMES = 1900  # of dates that name none, by strptime
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
 ROW_NUMBER = "[0]"  # in place of a column: the number of the row, from 0
+_SHORTEST_STEP_S = 1e-6
+_ROUNDED = (
+    f'; a rounded clock? If its rows are equally spaced, count them instead: columns = {{ time_s = "{ROW_NUMBER}" }}, '
+    f'units = {{ time_s = "{FRAME}" }} and rate_hz'
+)
 SLOWEST_SYNC_S = 0.002  # the strobe is high for 2.6 ms
 
 
@@ -121,15 +128,36 @@ def read_columns(
     sheet: Sheet, export: Export, wanted: Iterable[str], optional: Iterable[str] = ()
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Read columns under the data set's names and in its units, NaN where a cell is empty, and the indices of the
-    sheet's rows that they come from; rows at the end in which all these columns are empty belong to other columns.
-    Raises DatasetError naming file, line, column and cell."""
+    sheet's rows that they come from; rows at the end in which all these columns are empty belong to other columns, and
+    a last row of an export with a time alone is left out. Raises DatasetError naming file, line, column and cell."""
     rows = _rows(sheet, export)
     there = [name for name in optional if name in export.columns or name in sheet.labels()]
     columns = {name: _column(sheet, export, name, rows) for name in (*wanted, *there)}
     read = [values for name, values in columns.items() if export.columns.get(name) != ROW_NUMBER]
     filled = np.flatnonzero(np.any([~np.isnan(values) for values in read], axis=0))
     count = filled[-1] + 1 if len(filled) else 0
+    if export is not OWN_NAMES:
+        sheet.refuse_empty_lines(rows[:count])
+        channels = [values for name, values in columns.items() if name != "time_s"]
+        count -= bool(count and channels and np.isnan([values[count - 1] for values in channels]).all())
     return {name: values[:count] for name, values in columns.items()}, rows[:count]
+
+
+def refuse_falling(
+    times_s: np.ndarray, sheet: Sheet, rows: np.ndarray, export: Export = OWN_NAMES, name: str = "time_s"
+) -> None:
+    """Raise DatasetError if a time [s] is not later than the one before it."""
+    if not (falls := np.diff(times_s) < _SHORTEST_STEP_S).any():
+        return
+    at = int(np.argmax(falls))
+    before, time = times_s[at : at + 2].tolist()
+    if time < before:
+        problem = f"goes backwards: {time} after {before}"
+    elif time > before:
+        problem = f"advances by {time - before:g} s, less than the minimum of {_SHORTEST_STEP_S:g} s"
+    else:
+        problem = f"stands still: {time} after {before}{'' if export is OWN_NAMES else _ROUNDED}"
+    raise sheet.error(f"time {problem}", rows[at + 1], export.columns.get(name, name))
 
 
 def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarray) -> np.ndarray:
@@ -149,9 +177,12 @@ def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, 
 
 
 def dated_edges(export: Export, sheet: Sheet, rows: np.ndarray, edges: Sheet) -> np.ndarray:
-    """Times of the edges in a separate file, in s since the record's first row, if both files write dates."""
-    first = _moments(sheet, export, export.columns.get("time_s", "time_s"), rows[:1])
-    return _seconds(_moments(edges, export, "sync_time_s", np.arange(len(edges))), first)
+    """Times of the edges in a separate file, in s since the record's first row, if both files write dates; they
+    increase."""
+    first, all_edges = _moments(sheet, export, export.columns.get("time_s", "time_s"), rows[:1]), np.arange(len(edges))
+    times_s = _seconds(_moments(edges, export, "sync_time_s", all_edges), first)
+    refuse_falling(times_s, edges, all_edges, name="sync_time_s")
+    return times_s
 
 
 def _rows(sheet: Sheet, export: Export) -> np.ndarray:
@@ -176,7 +207,6 @@ def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.nda
     unit = export.units.get(name)
     if unit == DATE:
         moments = _moments(sheet, export, source, rows)
-        _refuse_midnight(sheet, moments, rows, source)
         return np.append(_seconds(moments, moments), np.full(len(rows) - len(moments), np.nan))
     if source == ROW_NUMBER:
         values = rows.astype(float)
@@ -204,7 +234,8 @@ def _moments(sheet: Sheet, export: Export, source: str, rows: np.ndarray) -> lis
             moments.append(_moment(cell, export.date_format, zone))
         except ValueError:
             form = f"of the form {export.date_format!r}" if export.date_format else "in ISO 8601 format (date_format)"
-            raise sheet.error(f"{cell!r} is not a date {form}", row, source) from None
+            raise sheet.error(f"{cell!r} is not a date {form}{sheet.another_table(row)}", row, source) from None
+    _refuse_midnight(sheet, moments, rows, source)
     return moments
 
 
@@ -224,15 +255,32 @@ def _refuse_midnight(sheet: Sheet, moments: list[datetime], rows: np.ndarray, so
 def _moment(cell: str, form: str | None, zone: ZoneInfo | None) -> datetime:
     """Parse the date in a cell; raises ValueError if there is none. `form`: as for strptime, None for ISO 8601. `zone`:
     time zone of dates that name none; if None, they are taken as UTC, without daylight-saving changes."""
-    text = cell.strip()
+    beyond, text = timedelta(), cell.strip()
     if form is None:
         moment = datetime.fromisoformat(text)
     else:
+        beyond, text = _turns(text, form)
+        if _FRACTION.search(form):
+            text = _BELOW_MICROSECONDS.sub("", text)
         try:
             moment = datetime.strptime(text, form)
         except ValueError:  # whole seconds are often written without a fraction
             moment = datetime.strptime(text, _FRACTION.sub("", form))
-    return (moment if moment.tzinfo else moment.replace(tzinfo=zone or UTC)).astimezone(UTC)
+    return (moment if moment.tzinfo else moment.replace(tzinfo=zone or UTC)).astimezone(UTC) + beyond
+
+
+def _turns(text: str, form: str) -> tuple[timedelta, str]:
+    """Split a clock that counts on, "25:10:03", "1.01:10:03" or, in minutes, "75:03", into what is beyond one turn of
+    its first hand, and the time within it."""
+    if not (clock := _CLOCK.fullmatch(form)):
+        return timedelta(), text
+    in_hours = clock[1] == "H"
+    days = r"(?:(\d{1,6})\.)??" if in_hours else "()"
+    if not (found := re.match(rf"{days}(\d{{1,6}}){re.escape(clock[2])}", text, re.ASCII)):
+        return timedelta(), text
+    turns, within = divmod(int(found[2]), 24 if in_hours else 60)
+    turn = timedelta(days=1) if in_hours else timedelta(hours=1)
+    return timedelta(days=int(found[1] or 0)) + turns * turn, f"{within}{text[found.end(2) :]}"
 
 
 def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:
@@ -330,9 +378,7 @@ def _form(fields: Fields) -> SheetForm:
     how["separator"] = SEPARATORS.get(str(mark), mark)
     if how["separator"] not in SEPARATORS.values():
         raise fields.error("separator", f"must be one of {', '.join(SEPARATORS)}, or that character")
-    if how.get("decimal") == how["separator"]:
-        raise fields.error("decimal", "must be another character than the separator")
-    between = how.get("thousands")  # numbers in quotes may have the comma that separates cells
+    between = how.get("thousands")  # numbers in quotes may have the comma that separates cells, as may decimals
     if between and (between == how.get("decimal", ".") or between == how["separator"] != ","):
         raise fields.error("thousands", "must be another character than the decimal sign and the separator")
     try:

@@ -15,7 +15,7 @@ from bifa.toml import parse_toml
 
 from .dataset import Dataset, Trial
 from .errors import DatasetError
-from .export import OWN_NAMES, ROLES, Export, parse_exports, read_columns
+from .export import OWN_NAMES, ROLES, Export, parse_exports, read_columns, refuse_falling
 from .fields import Fields, Source
 from .layout import (
     CHOICES,
@@ -33,7 +33,6 @@ from .layout import (
 from .sheet import Sheet
 
 LARGEST = 1e12  # in any unit: beyond any measurement, yet small enough to be squared and averaged
-_SHORTEST_STEP_S = 1e-6
 _CLOCK_S = 0.1  # tolerance for times outside their trial: of the order of a command's age
 
 
@@ -78,7 +77,7 @@ def _samples(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> di
     if export is OWN_NAMES:
         _check_header(sheet, layout)
     columns, rows = read_columns(sheet, export, layout.columns, layout.optional_columns)
-    _check_values(columns, sheet, rows, export.columns)
+    _check_values(columns, sheet, rows, export)
     return {"columns": columns} | ({"lines": [sheet.line(row) for row in rows]} if export is not OWN_NAMES else {})
 
 
@@ -99,17 +98,16 @@ def _check_header(sheet: Sheet, layout: Layout) -> None:
             raise sheet.error(f"the column is missing from the header; {expected}", -1, name)
 
 
-def _check_values(columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarray, named: Mapping[str, str]) -> None:
+def _check_values(columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarray, export: Export) -> None:
     """Raise DatasetError for values that cannot have been measured. Columns have the shape of `rows`, the sheet's rows
-    that they come from; `named`: a column's name in the file, if different."""
+    that they come from."""
 
     def refuse(name: str, wrong: np.ndarray, problem: str) -> None:
-        """`problem` is formatted with the first wrong `value`, the one `before` it, and the `step` between them."""
+        """`problem` is formatted with the first wrong `value`."""
         if wrong.any():
             row = int(np.argmax(wrong))
-            value, before = (float(columns[name][at]) for at in (row, row - 1))
-            message = problem.format(value=value, before=before, step=value - before)
-            raise sheet.error(message, int(rows[row]), named.get(name, name))
+            problem = problem.format(value=float(columns[name][row]))
+            raise sheet.error(problem, int(rows[row]), export.columns.get(name, name))
 
     if len(rows) < 2:
         raise sheet.error(f"{len(rows)} rows of data; at least two are needed", len(sheet) - 1)
@@ -118,11 +116,7 @@ def _check_values(columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndar
         refuse(name, np.abs(values) > LARGEST, f"{{value:g}} is beyond any measurement (largest: {LARGEST:g})")
         if is_command(name):
             refuse(name, (values != 0) & (values != 1), "command {value:g} is neither 1 (positive) nor 0 (vacuum)")
-    step_s = np.diff(columns["time_s"], prepend=-np.inf)
-    refuse("time_s", step_s < 0, "time goes backwards: {value} after {before}")
-    refuse("time_s", step_s == 0, "time stands still: {value} after {before}")
-    too_short = f"time advances by {{step:g}} s, less than the minimum of {_SHORTEST_STEP_S:g} s"
-    refuse("time_s", step_s < _SHORTEST_STEP_S, too_short)
+    refuse_falling(columns["time_s"], sheet, rows, export)
 
 
 def _read_toml(folder: Path) -> tuple[Fields, Source]:

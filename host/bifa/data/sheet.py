@@ -29,6 +29,7 @@ _NAMES_OF = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
 _BETWEEN_CELLS = "\x1f"  # of a workbook's row as text
 _HEAD = 1 << 18  # bytes in which a header has to be found
 _MAX_LISTED = 8
+_DATUM = re.compile(r"[-+.,]?\d")  # how numbers, dates and times begin
 _PLACE = re.compile(r"(?:(.+) )?\[([1-9]\d*)\]", re.ASCII)  # "X [2]", the second X; "[2]", the second of all
 
 
@@ -53,6 +54,11 @@ class SheetForm:
     above: tuple[str, ...] = ()
     units_above: str | None = None
     sheet: str | None = None
+
+    @property
+    def names_table(self) -> bool:
+        """Whether it says which of several tables one below another is read."""
+        return self.header is not None and bool(self.above or self.skip_rows)
 
 
 OWN = SheetForm()
@@ -93,12 +99,13 @@ class Sheet:
             raw = raw.removeprefix(codecs.BOM_UTF8)  # spreadsheets write one
         if b"\r" in raw[:_HEAD] and b"\n" not in raw[:_HEAD]:
             raw = raw.replace(b"\r", b"\n")
-        lines = (raw if self._form.above else raw[:_HEAD]).split(b"\n")  # other tables may be above the one declared
+        whole = self._form.above or self._form.names_table  # other tables may be above and below the one declared
+        lines = (raw if whole else raw[:_HEAD]).split(b"\n")
         texts = [line.decode(self._encoding, "replace") for line in lines]
-        begin, end = self._head(texts)
+        begin, end, stop = self._head(texts)
         heads = [self._cells(self._decoded(line), at) for at, line in enumerate(lines[begin:end], begin + 1)]
-        offset = sum(len(line) + 1 for line in lines[:end])
-        return texts[:begin], heads, raw[offset:]
+        first, last = (sum(len(line) + 1 for line in lines[:place]) for place in (end, stop))
+        return texts[:begin], heads, raw[first:] if stop == len(lines) else raw[first:last]
 
     def _decoded(self, raw: bytes) -> str:
         encoding = self._encoding
@@ -114,8 +121,9 @@ class Sheet:
                 whole.count(b"\n", 0, at) + 1,
             ) from None
 
-    def _head(self, lines: Sequence[str]) -> tuple[int, int]:
-        """Return the indices of the first row of names and, after names and units, of data; set `first`."""
+    def _head(self, lines: Sequence[str]) -> tuple[int, int, int]:
+        """Return the indices of the first row of names, of data after names and units, and of what is below the table;
+        set `first`."""
         header, upper, begins = self._form.header, self._form.header_rows - 1, [self._form.skip_rows]
         if header is not None:
             lasts = (place for place, _ in self._labeled(header, lines) if place >= max(upper, self._form.skip_rows))
@@ -124,9 +132,25 @@ class Sheet:
             raise self._error(f"no line begins with {header!r}, the declared header of the column names{self._which}")
         below = self._below(self._form.above, lines[: begins[-1]]) if self._form.above else 0
         begin = next(begin for begin in begins if begin >= below)
-        end = begin + self._form.header_rows + self._form.units_rows
-        self.first = end + 1
-        return begin, end
+        named = begin + self._form.header_rows
+        end = named + self._form.units_rows
+        self.first, self._names_line = end + 1, lines[named - 1] if begin < named <= len(lines) else None
+        return begin, end, self._stop(lines, end)
+
+    def _stop(self, lines: Sequence[str], end: int) -> int:
+        """Return the index of the line at which a table that is declared among others ends: where its names stand again
+        or, if what is above them is no data, at the first empty line before that."""
+        labeled = self._labeled(self._form.header or "", lines) if self._form.names_table else []
+        if (again := next((place for place, _ in labeled if place >= end), None)) is None:
+            return len(lines)
+        named = max(end, again + 1 - max(self._form.header_rows, 1))
+        stop = next((place for place in range(end, again) if not self._bare(lines[place])), named)
+        below = next(filter(None, map(self._bare, lines[stop:])), "")
+        return len(lines) if _DATUM.match(below) else stop
+
+    def _bare(self, line: str) -> str:
+        """The line without empty cells at its ends; "" if it is empty."""
+        return line.strip(f'" \r{self._form.separator}{_BETWEEN_CELLS}')
 
     def _labeled(self, label: str, lines: Sequence[str]) -> list[tuple[int, list[str]]]:
         """Indices and cells of the lines whose first cell is `label`."""
@@ -169,8 +193,8 @@ class Sheet:
         frame = _excel(self._path, int(place[2]) - 1 if place and not place[1] else sheet, self.file)
         rows = _texts(frame)
         lines = [_BETWEEN_CELLS.join(row) for row in rows]
-        begin, end = self._head(lines)
-        return lines[:begin], rows[begin:end], frame.iloc[end:].reset_index(drop=True)
+        begin, end, stop = self._head(lines)
+        return lines[:begin], rows[begin:end], frame.iloc[end:stop].reset_index(drop=True)
 
     def _first_width(self) -> int:
         """Number of columns in the first row of data."""
@@ -189,9 +213,19 @@ class Sheet:
             beyond = frame.iloc[:, width:].notna().to_numpy().any(axis=1)
             if beyond.any():
                 self._refuse_beyond(int(np.flatnonzero(beyond)[0]))
+        if self._form.format == "csv" and len(frame) > 1:
+            before, last = (len(self._written(row)) for row in (len(frame) - 2, len(frame) - 1))
+            if last < before:
+                self.refuse_cut()
         empty = frame.isna().to_numpy().all(axis=1)
         last = len(frame) - int(np.argmin(empty[::-1])) if len(frame) and not empty.all() else 0
         return frame.iloc[:last]
+
+    def refuse_cut(self) -> None:
+        """Refuse a last line without a line break, as of a file that was cut, perhaps within a number."""
+        if self._form.format == "csv" and self._rows.rpartition(b"\n")[2].strip():
+            problem = "no line break: was the file cut here? Copy it again, remove this line or, if it is whole, end it"
+            raise self.error(problem, len(self._lines) - 1)
 
     def _refuse_too_few(self, frame: Any, width: int) -> None:
         """Refuse a row of fewer fields than names, except an empty one: between blanks, an empty cell leaves no trace,
@@ -206,7 +240,7 @@ class Sheet:
         if (short := np.flatnonzero((fields > 0) & (fields < width))).size:
             row = int(short[0])
             problem = f"{fields[row]} fields, but {width} columns: which of them is missing is unknown"
-            raise self.error(f"{problem}{self._below_a_gap(row) or '; export with another separator'}", row)
+            raise self.error(f"{problem}{self.another_table(row) or '; export with another separator'}", row)
 
     def _parsed(self) -> Any:
         """The table as pandas reads it; if pandas fails or finds another number of lines than the file has (an unclosed
@@ -340,7 +374,7 @@ class Sheet:
         cell = cell.strip(BLANKS)
         found = self._read(cell)
         if found is None and cell:
-            problem = f"{_shown(cell)} is not a number{self._hint(cell) or self._below_a_gap(row)}"
+            problem = f"{_shown(cell)} is not a number{self._hint(cell) or self.another_table(row)}"
             raise self.error(problem, row, name)
         return np.nan if found is None else found
 
@@ -366,24 +400,36 @@ class Sheet:
         width = len(self.names)
         cells = self._written(row) if self._form.format == "csv" else []
         beyond = next((f" ({_shown(cell)} is under none)" for cell in cells[width:] if cell.strip()), "")
-        cause = self._below_a_gap(row) or (
+        cause = self.another_table(row) or (
             "; are there commas in the numbers, or lines above the column names? Save it with decimal points and "
             "without such lines, or declare how it is written (bifa instrument)"
         )
         raise self.error(f"{max(len(cells), width + 1)} fields, but {width} columns{beyond}{cause}", row)
 
-    def _below_a_gap(self, row: int) -> str:
-        """What to do about a fault below an empty line, where another table may begin; "" if there is no such line."""
+    def refuse_empty_lines(self, rows: np.ndarray) -> None:
+        """Refuse empty lines among `rows`."""
+        if (empty := self._frame.isna().to_numpy().all(axis=1)[rows]).any():
+            row = int(rows[np.argmax(empty)])
+            raise self.error(f"the line is empty{self.another_table(row)}", row)
+
+    def another_table(self, row: int) -> str:
+        """Return what to do about a fault in or below an empty line, or where the names stand again, since another
+        table may begin there; "" if there is no such line."""
         if self._form.format == "xlsx":
-            empty = self._rows.iloc[:row].isna().to_numpy().all(axis=1)
+            lines = [_BETWEEN_CELLS.join(cells) for cells in _texts(self._rows)]
         else:
-            empty = np.array([not line.strip(b'" \r' + self._form.separator.encode()) for line in self._lines[:row]])
-        if not empty.any():
+            lines = [line.decode(self._encoding, "replace") for line in self._lines]
+        empty = (at for at, line in enumerate(lines[: row + 1]) if not self._bare(line))
+        named = (at for at, line in enumerate(lines) if line == self._names_line)
+        begins, first = "below the empty line", next(empty, None)
+        if first is None:
+            begins, first = "with the names in line", next(named, None)
+        if first is None:
             return ""
-        line = self.line(int(np.argmax(empty)))
         return (
-            f"; does another table begin below the empty line {line}? One table is read, the first or the one that "
-            "header and above name: remove what is below it"
+            f"; does another table begin {begins} {self.line(first)}? One table is read: remove what is below it, or "
+            "declare header and, by above or skip_rows, which table it is; it then ends at the empty line before its "
+            "names stand again"
         )
 
 

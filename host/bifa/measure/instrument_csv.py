@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bifa.data import Dataset, DatasetError, Trial, read_dataset, write_dataset
-from bifa.data.export import DATE, OWN_NAMES, Export, dated_edges, read_export, sync_edges
+from bifa.data.export import DATE, OWN_NAMES, Export, dated_edges, read_export, refuse_falling, sync_edges
 from bifa.data.layout import TABLE_FILE
 from bifa.data.lost import codes
 from bifa.data.sheet import Sheet
@@ -123,7 +123,7 @@ def read_instrument(
     if _TAIL in columns and np.isnan(columns[_TAIL]).all():
         del columns[_TAIL]
     _refuse_gaps(columns, sheet, rows, columns, _LOST)
-    _refuse_falling(columns, sheet, rows, "time_s")
+    refuse_falling(columns["time_s"], sheet, rows, export or OWN_NAMES)
     for name in (name for name in columns if name != "time_s"):
         called = (export or OWN_NAMES).columns.get(name, name)
         written = sheet.numbers(sheet.find(called), called, rows)  # in the file's unit: in mm, -999 m is not a code
@@ -154,7 +154,7 @@ def _read_edges(path: Path) -> np.ndarray:
         )
     edges, sheet, rows = _read(path, ("sync_time_s",))
     _refuse_gaps(edges, sheet, rows, edges, _LOST)
-    _refuse_falling(edges, sheet, rows, "sync_time_s")
+    refuse_falling(edges["sync_time_s"], sheet, rows, name="sync_time_s")
     return edges["sync_time_s"]
 
 
@@ -171,6 +171,7 @@ def _read_telemetry(path: Path, planned: PlannedTrial) -> dict[str, np.ndarray]:
     whole = ("time_s", "sequence", *(f"pressure_{chamber}_psi" for chamber in CHAMBERS))
     wanted = (*whole, *(f"command_{chamber}" for chamber in _commanded(planned)))
     columns, sheet, rows = _read(path, wanted, ("strobe",))
+    sheet.refuse_cut()
     _refuse_gaps(columns, sheet, rows, whole, "no value (a cut line?); remove that line, or record again")
     return columns
 
@@ -186,13 +187,6 @@ def _refuse_gaps(columns: Columns, sheet: Sheet, rows: np.ndarray, names: Iterab
     for name in names:
         if not np.isfinite(columns[name]).all():
             raise sheet.error(problem, rows[np.argmin(np.isfinite(columns[name]))], name)
-
-
-def _refuse_falling(columns: Columns, sheet: Sheet, rows: np.ndarray, name: str) -> None:
-    falls = np.diff(columns[name]) <= 0.0
-    if falls.any():
-        problem = "not later than the line before; times must increase from line to line"
-        raise sheet.error(problem, rows[np.argmax(falls) + 1], name)
 
 
 def _telemetry_file(path: Path) -> Path:

@@ -34,7 +34,7 @@ _NAME_PATTERNS = {  # names that a column may have, in the languages of the pres
     "force": (r"force|load|kraft", r"last|charge"),
 }
 _DAY = r"\d{1,4}[-/.](\d{1,2}|[a-z]{3})[-/.]\d{1,4}"
-_CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?( ?[ap]m)?(Z|[+-]\d\d:?\d\d)?"
+_CLOCK = r"(\d+\.)?\d+:\d\d(:\d\d)?([.,:]\d+)?( ?[ap]m)?(Z|[+-]\d\d:?\d\d)?"
 _IN_BRACKETS = re.compile(r"\(.*\)|\[.*\]")
 _OTHER_UNITS = {"v", "mv", "volt", "volts", "%", "mm/mm", "°"}
 _MOMENT = re.compile(rf"{_DAY}([T ]+{_CLOCK})?|{_CLOCK}", re.ASCII | re.IGNORECASE)
@@ -122,7 +122,7 @@ def _text(path: Path) -> dict[str, Any]:
     for name, mark in SEPARATORS.items():
         rows = [_split(line, mark) for line in lines]
         for decimal in (".", ","):
-            if decimal != mark and (found := _numbers(rows, decimal))[0]:
+            if (found := _numbers(rows, decimal))[0]:
                 run, first = found
                 share = _share_of_numbers(rows[first], decimal)  # "0,5;1,5" split at commas: two of three are numbers
                 best = max(best, (run, share, -first, name, decimal), key=lambda one: one[:3])

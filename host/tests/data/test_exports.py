@@ -171,6 +171,19 @@ def test_rows_that_do_not_count_neither_begin_the_clock_nor_have_to_be_numbers(t
         dated_edges(declared(text), sheet, counted, Sheet(tmp_path / "a.sync.csv"))
 
 
+def test_edges_by_a_clock_count_as_its_record_does(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x,F\n24:00:01,1,2\n24:00:02,1,2\n")
+    (tmp_path / "a.sync.csv").write_text("sync_time_s\n23:59:59.5\n1.00:00:01.5\n")
+    _, sheet, rows = read_export(tmp_path / "a.csv", declared(CLOCK), MACHINE)
+    assert dated_edges(declared(CLOCK), sheet, rows, Sheet(tmp_path / "a.sync.csv")).tolist() == [-1.5, 0.5]
+    (tmp_path / "a.sync.csv").write_text("sync_time_s\n23:59:59.5\n00:00:01.5\n")
+    with pytest.raises(DatasetError, match=r"a\.sync\.csv, line 3, .*time of day goes backwards: past midnight"):
+        dated_edges(declared(CLOCK), sheet, rows, Sheet(tmp_path / "a.sync.csv"))
+    (tmp_path / "a.sync.csv").write_text("sync_time_s\n24:00:03\n24:00:03\n")
+    with pytest.raises(DatasetError, match=r"line 3, column sync_time_s: time stands still: 2\.0 after 2\.0$"):
+        dated_edges(declared(CLOCK), sheet, rows, Sheet(tmp_path / "a.sync.csv"))
+
+
 @pytest.mark.parametrize(
     ("text", "form"),
     [
@@ -189,6 +202,7 @@ def test_columns_without_names_are_known_by_their_places(tmp_path, text, form):
         read(tmp_path, text, places.replace("[3]", "[4]") + form)
 
 
+CLOCK = DATED + 'date_format = "%H:%M:%S.%f"\n'
 DAY = DATED + 'date_format = "%I:%M:%S.%f %p"\n'
 COUNTED = named("[0]").replace('time_s = "s"', 'time_s = "frame"') + "rate_hz = 50\n"
 UNITS = "but units.force_N is declared as N"
@@ -213,9 +227,39 @@ READ = {
         [[0.0, 0.02], [1.0, 2.0], [2.0, 3.0]],
     ),
     "lost at the first and the last row": (
-        "t,x,F\n0,,\n1,2,3\n2,,\n",
+        "t,x,F\n0,,\n1,2,3\n2,2,\n",
         SIMPLE,
-        [[0.0, 1.0, 2.0], [np.nan, 2.0, np.nan], [np.nan, 3.0, np.nan]],
+        [[0.0, 1.0, 2.0], [np.nan, 2.0, 2.0], [np.nan, 3.0, np.nan]],
+    ),
+    "a last time without values (Keysight)": (
+        "t,x,F\n0,1,2\n1,,\n2,,\n",
+        SIMPLE,
+        [[0.0, 1.0], [1.0, np.nan], [2.0, np.nan]],
+    ),
+    "a clock beyond a day, its last digits beyond microseconds": (
+        "t,x,F\n23:59:59.1234567,1,2\n24:00:00,1,2\n25:10:03.500000000,1,2\n",
+        CLOCK,
+        [[0.0, 0.876544, 4204.376544], [1.0] * 3, [2.0] * 3],
+    ),
+    "a clock that counts days, as .NET writes it": (
+        "t,x,F\n23:59:58.5,1,2\n1.00:00:00,1,2\n1.02:03:04.2500000,1,2\n",
+        CLOCK,
+        [[0.0, 1.5, 7385.75], [1.0] * 3, [2.0] * 3],
+    ),
+    "a clock of points, the first of which ends the hours": (
+        "t,x,F\n23.59.58,1,2\n26.00.00,1,2\n",
+        DATED + 'date_format = "%H.%M.%S"\n',
+        [[0.0, 7202.0], [1.0] * 2, [2.0] * 2],
+    ),
+    "minutes beyond an hour": (
+        "t,x,F\n59:59.5,1,2\n75:03.25,1,2\n",
+        DATED + 'date_format = "%M:%S.%f"\n',
+        [[0.0, 903.75], [1.0] * 2, [2.0] * 2],
+    ),
+    "decimal commas in quotes between commas": (
+        't,x,F\n0,"1,25","-3,5"\n"0,5",2,"1,5e3"\n',
+        SIMPLE + 'decimal = ","\n',
+        [[0.0, 0.5], [1.25, 2.0], [-3.5, 1500.0]],
     ),
     "a name over several columns, as a spreadsheet merges cells, though the first column has one too": (
         "Time,Head,,Tail,\n,x,y,x,y\n0,1,2,3,4\n1,2,3,4,5\n",
@@ -348,6 +392,21 @@ def test_a_workbook_comes_in(tmp_path):
             DAY,
             "line 3, column t: time of day goes backwards: past midnight, the date",
         ),
+        ("t,x,F\n23:00:00,1,2\n12:75:00,1,2\n", CLOCK, "line 3, column t: '12:75:00' is not a date of the form"),
+        (
+            "t,x,F\n0,0.5,1\n1,1,5\n",
+            SIMPLE + 'decimal = ","\n',
+            r"line 2, column x: '0\.5' is not a number; decimal poi",
+        ),
+        ("t,x,F\n0,0,5,1\n", SIMPLE + 'decimal = ","\n', FIELDS.format("2", "'1'") + "are there commas"),
+        ("t,x,F,n\n0,1,2,1\n1,2,3", SIMPLE, r"line 3: no line break: was the file cut here\?"),
+        (ROWS + "\n2,3,4\n", SIMPLE, r"line 4: the line is empty; does another table begin below the empty line 4\?"),
+        (ROWS + "t,x,F\n0,1,2\n", SIMPLE, r"line 4, column t: 't' is not .* begin with the names in line 4\?"),
+        (
+            ROWS.replace("0", "2026-11-25").replace("\n1,2", "\n\n2026-11-26,2"),
+            DATED,
+            r"line 3, column t: '' is not a date in .*; does another table begin below the empty line 3\?",
+        ),
     ],
 )
 def test_a_fault_is_named_by_line_column_and_cell(tmp_path, text, declaration, said):
@@ -379,8 +438,37 @@ def test_of_several_tables_one_below_another_the_declared_one_is_read(tmp_path):
     assert [values.tolist() for values in found.values()] == [[0.07, 0.08], [1.5, 1.25]]
     assert look(path).sheet.has("robot:head / X")
     path.write_text("\n".join(reversed(tables)))
-    with pytest.raises(DatasetError, match=r"line 9, column Frame: 'Devices' is not.* another table .* empty line 8\?"):
+    again, _, _ = read_export(path, export, ("time_s", "displacement_mm"))
+    assert [values.tolist() for values in again.values()] == [[0.07, 0.08], [1.5, 1.25]]
+    path.write_text(
+        "\n".join(["Trajectories\n100\n,,robot:head,,\nFrame,Sub Frame,X\n,,mm\n7,0,1\n\n8,0,2\n", tables[0]])
+    )
+    with pytest.raises(DatasetError, match=r"line 10, column Frame: 'Devices' .* below the empty line 7\?"):
         read_export(path, export, ("time_s", "displacement_mm"))
+
+
+STACKED = "MTS793\n\nStored at:\t1\tcycle\nt\tx\tF\n0\t1\t2\n1\t2\t3\n"
+STACKED += "\nStored at:\t10\tcycle\nt\tx\tF\n8\t3\t4\n9\t5\t6\n\nPoints:\t2\nt\tx\tF\n20\t0\t0\n21\t0\t0\n"
+
+
+@pytest.mark.parametrize(
+    ("which", "times_s"),
+    [
+        ('above = ["Stored at:", "1"]', [0.0, 1.0]),
+        ('above = ["Stored at:", "10"]', [8.0, 9.0]),
+        ("skip_rows = 8", [8.0, 9.0]),
+        ("skip_rows = 12", [20.0, 21.0]),
+    ],
+)
+def test_of_tables_with_the_same_names_the_declared_one_is_read_up_to_the_next(tmp_path, which, times_s):
+    form = SIMPLE + 'separator = "tab"\nheader = "t"\n'
+    with pytest.raises(
+        DatasetError, match=r"line 8, column t: 'Stored at:' .* line 7\?.* by above or skip_rows, which"
+    ):
+        read(tmp_path, STACKED, form)
+    assert read(tmp_path, STACKED, f"{form}{which}\n")["time_s"].tolist() == times_s
+    restarted = ROWS + ROWS.replace("0", "7").replace("\n1", "\n8") + ROWS
+    assert read(tmp_path, restarted, SIMPLE + 'header = "t"\nskip_rows = 1\n')["time_s"].tolist() == [7.0, 8.0]
 
 
 @pytest.mark.parametrize(
@@ -441,7 +529,6 @@ def test_an_export_that_states_another_rate_or_unit_than_its_preset_is_refused(
         (SIMPLE + 'preset = "bluehil"\n', r"preset: 'bluehil' is unknown; it must be one of arduino"),
         (SIMPLE + 'encoding = "latin1-de"\n', r"encoding: 'latin1-de' is unknown"),
         (SIMPLE + 'separator = "|"\n', r"separator: must be one of comma"),
-        (SIMPLE + 'decimal = ","\n', r"decimal: must be"),
         (SIMPLE + 'thousands = "."\n', r"thousands: must be another character"),
         (COUNTED + "where = { body = 1 }\n", r"where: leaves rows out, which \[0\] would count"),
         (SIMPLE + "sign = { force_N = 2 }\n", r"sign: force_N must be 1 or -1"),
@@ -501,7 +588,7 @@ def test_any_number_is_read_to_the_last_bit(values, how, encoding):
 
 FORMS = ['separator = ";"\ndecimal = ","', 'separator = "space"', 'separator = "tab"\nheader = "t"']
 FORMS += ['encoding = "utf-16"', "skip_rows = 2\nheader_rows = 2", "units_rows = 1", "where = { x = 1 }", ""]
-FORMS += ["header_rows = 0"]
+FORMS += ["header_rows = 0", 'header = "t"\nskip_rows = 1', 'header = "t"\nabove = ["t"]\ndecimal = ","']
 
 
 @settings(max_examples=250)

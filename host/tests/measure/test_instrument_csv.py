@@ -59,7 +59,7 @@ def files(tmp_path, request):
 
 def write(path, columns):
     rows = zip(*columns.values(), strict=True)
-    path.write_text(",".join(columns) + "\n" + "\n".join(",".join(f"{v:.6f}" for v in row) for row in rows))
+    path.write_text(",".join(columns) + "\n" + "".join(",".join(f"{v:.6f}" for v in row) + "\n" for row in rows))
 
 
 def test_the_two_records_are_brought_onto_one_clock(files):
@@ -125,7 +125,7 @@ def filmed(files, camera_s, moves_s):
     (files / "pull.sync.csv").rename(files / "cam.sync.csv")
     header, *rows = (files / "telemetry_1.csv").read_text().splitlines()
     text = "\n".join([f"{header},command_body", *(f"{row},{float(row[:4]) >= 2.5:d}" for row in rows)])
-    (files / "telemetry_1.csv").write_text(text)
+    (files / "telemetry_1.csv").write_text(text + "\n")
     return files / "cam.csv"
 
 
@@ -145,7 +145,7 @@ def test_a_walk_that_was_filmed_from_its_middle_on_is_refused(files):
     header, *rows = telemetry.read_text().splitlines()
     commands = [",0,1,1" if float(row.split(",")[0]) >= 2.0 else ",,," for row in rows]
     named = ",".join([header, *(f"command_{chamber}" for chamber in CHAMBERS)])
-    telemetry.write_text("\n".join([named, *map(str.__add__, rows, commands)]))
+    telemetry.write_text("\n".join([named, *map(str.__add__, rows, commands), ""]))
     (files / "pull.sync.csv").rename(files / "cam.sync.csv")
     walk = PlannedTrial("locomotion", gait=BASELINE, cycles=1)
 
@@ -180,7 +180,7 @@ def with_cell(cell):
 
 def with_a_hole(text):
     header, *rows = text.splitlines()
-    return "\n".join([header, *(row for row in rows if not 4.5 < float(row.split(",")[0]) < 6.5)])
+    return "\n".join([header, *(row for row in rows if not 4.5 < float(row.split(",")[0]) < 6.5), ""])
 
 
 SCATTERED_S = np.sort(np.arange(1, 800) * 0.01 + 0.008 * np.random.default_rng(0).random(799))
@@ -200,8 +200,9 @@ LINE_41 = r"pull\.csv, line 41, column displacement_mm: "
         ("telemetry_1.csv", "time_s,sequence\n1,2\n2,3\n", "pressure_body_psi"),
         ("telemetry_1.csv", lambda text: text.replace(",200.000000,", ",,"), "column sequence: no value"),
         ("telemetry_1.csv", with_a_hole, r"the telemetry has a gap of 2\.00 s at 4\.50 s"),
-        ("pull.csv", table((1, 2, 2, 3)), "line 4, column time_s: not later"),
-        ("pull.sync.csv", "sync_time_s\n1\n3\n2\n", "line 4, column sync_time_s: not later"),
+        ("telemetry_1.csv", lambda text: text[:-5], "line 691: no line break: was the file cut here"),
+        ("pull.csv", table((1, 2, 2, 3)), r"line 4, column time_s: time stands still: 2\.0 after 2\.0$"),
+        ("pull.sync.csv", "sync_time_s\n1\n3\n2\n", r"line 4, column sync_time_s: time goes backwards: 2\.0 after 3"),
         ("pull.csv", table().replace(",", ";"), "separated by semicolons"),
         ("pull.csv", table().replace(",", "\t"), "separated by tabs"),
         ("pull.csv", table(end=",5"), "line 2: 4 fields, but 3 columns.*decimal points"),
@@ -250,7 +251,7 @@ def test_the_first_edge_after_a_restart_is_sample_1():
 @pytest.mark.parametrize("files", ["marked"], indirect=True)
 def test_samples_lost_about_the_mark_ask_for_another_recording(files):
     lines = (files / "telemetry_1.csv").read_text().splitlines()
-    (files / "telemetry_1.csv").write_text("\n".join(line for line in lines if f",{MARKED}.000000," not in line))
+    (files / "telemetry_1.csv").write_text("".join(f"{line}\n" for line in lines if f",{MARKED}.000000," not in line))
     with pytest.raises(DatasetError, match=r"lost on the link.*record again"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
@@ -350,6 +351,21 @@ def test_a_clock_of_dates_has_its_edges_as_dates(files):
     own, _ = import_trial(files / "pull.csv", files, PULL, files / "own")
     for column, values in own.trials[0].columns.items():
         np.testing.assert_allclose(dataset.trials[0].columns[column], values, atol=1e-5)
+
+
+def test_a_clock_that_is_rounded_is_refused_with_what_to_declare(tmp_path):
+    (tmp_path / "log.csv").write_text("t,x,F,D10\n" + "".join(f"12:00:0{n // 4},{n},1,{n % 2}\n" for n in range(8)))
+    sync = 'sync = { column = "D10", threshold = 0.5 }\nrate_hz = 500\n'
+    clock = FORM.replace('time_s = "s"', 'time_s = "date"') + 'date_format = "%H:%M:%S"\n' + sync
+    said = (
+        r'line 3, column t: time stands still: 0\.0 after 0\.0; a rounded .* time_s = "\[0\]" .* "frame" \} and rate_hz'
+    )
+    with pytest.raises(DatasetError, match=said):
+        read_instrument(tmp_path / "log.csv", ("force_N",), declared(clock))
+    counted = FORM.replace('time_s = "t"', 'time_s = "[0]"').replace('time_s = "s"', 'time_s = "frame"') + sync
+    columns, edges = read_instrument(tmp_path / "log.csv", ("force_N",), declared(counted))
+    np.testing.assert_allclose(columns["time_s"], 0.002 * np.arange(8))
+    np.testing.assert_allclose(edges, [0.002, 0.006, 0.01, 0.014])
 
 
 @pytest.mark.parametrize("files", ["marked"], indirect=True)

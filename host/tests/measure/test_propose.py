@@ -155,6 +155,19 @@ def test_decimal_commas_are_no_separators_however_few_columns_there_are(tmp_path
     np.testing.assert_array_equal(seen.sheet.numbers(columns - 1, ""), [0.25] * 5)
 
 
+def test_decimal_commas_in_quotes_are_seen_between_commas(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x\n" + '"0,25","1,5"\n' * 3)
+    assert look(tmp_path / "a.csv").how == {"decimal": ","}
+
+
+def test_a_clock_that_is_rounded_is_not_declared(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,x,F\n" + "".join(f"{n // 2},1,2\n" for n in range(6)))
+    said = asked(path, tmp_path, "", "s", "x", "mm", "n", "F", "N", "n", "file", "y")
+    assert "line 3, column time: time stands still: 0.0 after 0.0; a rounded clock?" in str(said.exception)
+    assert not (tmp_path / "bench.toml").exists()
+
+
 ROWS = "0,1,5\n1,2,6\n2,3,7\n"
 
 
@@ -174,6 +187,7 @@ ROWS = "0,1,5\n1,2,6\n2,3,7\n"
         ),
         ("n,t,x,F\n0,0,none,---\n1,1,1,5\n2,2,2,6\n", {}, ["n", "t", "x", "F"]),
         ("x-axis,1,2\nsecond,Volt,Volt\n" + ROWS, {"units_rows": 1}, ["x-axis", "1", "2"]),
+        ("t,x\n" + "".join(f"{h}:59:59.1234567,{h}\n" for h in ("1.02", "125", "23")), {}, ["t", "x"]),
         ("t,x\n" + "".join(f"2026-11-25 10:00:0{k}.5 PM,{k}\n" for k in range(3)), {}, ["t", "x"]),
     ],
 )
