@@ -112,7 +112,7 @@ def generate(
     size: float | None = None,
     label_file: Path | None = None,
 ) -> Label:
-    """Write the data set `out` and its label; both appear complete or not at all.
+    """Write the data set `out` and its label, which is complete before the data set appears.
 
     `effect` and `size` (a factor of its modest size) replace what would be drawn. Raises SealedError if `out`
     exists, or if the kind or effect is unknown.
@@ -129,9 +129,10 @@ def generate(
         effects = {effect: EFFECTS[effect].at(sizes[effect], random)}
     lab = Lab(parameters | plant_parameters(effects), curves)
     label = Label(seed, kind, sizes, effects, parameters)
-    write(out, f"sealed-{seed}", lab, random)
-    content = {"format": 1, **asdict(label)}
-    (label_file or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(content))
+    with new_folder(out) as folder:
+        write(folder, f"sealed-{seed}", lab, random)
+        content = {"format": 1, **asdict(label)}
+        (label_file or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(content))
     return label
 
 
@@ -145,19 +146,18 @@ def check_request(out: Path, effect: str | None, size: float | None) -> None:
         raise SealedError("the size of a drawn effect is drawn as well; name the effect")
 
 
-def write(out: Path, name: str, lab: Lab, random: np.random.Generator) -> None:
+def write(folder: Path, name: str, lab: Lab, random: np.random.Generator) -> None:
     """Run the day's trials in a random order and write them in the contract's format."""
     day = [(plan, repeat) for plan in plans() for repeat in range(1, REPEATS + 1)]
     order = {job: place for place, job in enumerate(random.permutation(len(day)))}
-    with new_folder(out) as folder:
-        entries = []
-        for job, (plan, repeat) in enumerate(day):
-            place = order[job]
-            columns = lab.run(plan, place / (len(day) - 1), random)
-            file = f"{plan.name}_{repeat}.csv"
-            write_csv(folder / file, columns)
-            entries.append({"file": file, **plan.entry(), "repeat": repeat, "session_order": int(place) + 1})
-        write_head(folder, name, {key: round(lab.parameters[key], 6) for key in _KNOWN}, entries)
+    entries = []
+    for job, (plan, repeat) in enumerate(day):
+        place = order[job]
+        columns = lab.run(plan, place / (len(day) - 1), random)
+        file = f"{plan.name}_{repeat}.csv"
+        write_csv(folder / file, columns)
+        entries.append({"file": file, **plan.entry(), "repeat": repeat, "session_order": int(place) + 1})
+    write_head(folder, name, {key: round(lab.parameters[key], 6) for key in _KNOWN}, entries)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -2,6 +2,8 @@
 through the firmware (the realistic truth)."""
 
 import tomllib
+from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from virtual_robot.effects import LIBRARY, OUTSIDE
 from virtual_robot.instruments.sensors import Noise, measured
 from virtual_robot.plant import NOMINAL, profile
 from virtual_robot.sealed import SealedError, draw_effects, generate, main
+from virtual_robot.truths.foreign.day import Day
 
 CONTRACT = {
     *("hysteresis", "viscoelasticity", "backlash", "area_variation", "valve_latency", "valve_asymmetry"),
@@ -74,6 +77,16 @@ def test_nothing_is_overwritten_and_nothing_half_written(tmp_path, monkeypatch, 
     assert sorted(p.name for p in tmp_path.iterdir()) == ["there"]
     with pytest.raises(SealedError, match="no effect 'magic'"):
         generate(1, tmp_path / "new", effect="magic")
+
+
+@pytest.mark.parametrize("truth", ["own", "foreign"])
+def test_there_is_no_data_set_without_its_seal(tmp_path, monkeypatch, truth):
+    monkeypatch.setattr(sealed, "plans", list)
+    monkeypatch.setattr(Day, "run", lambda self: {})
+    monkeypatch.setattr(Path, "rename", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        main(["--truth", truth, "--seed", "1", "--out", str(tmp_path / "day")])
+    assert [path.name for path in tmp_path.iterdir()] == ["day.sealed.toml"]
 
 
 PLAN = (PlannedTrial("step_response", "small", 8.5),)

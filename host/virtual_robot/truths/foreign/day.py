@@ -220,7 +220,8 @@ def generate(
     form: str | None = None,
     seal: Path | None = None,
 ) -> Label:
-    """Write the data set `out` and its seal (default: OUT.sealed.toml beside it); both complete or not at all.
+    """Write the data set `out` and its seal (default: OUT.sealed.toml beside it), which is complete before the data
+    set appears.
 
     `effect`, `size` (a factor of its modest size) and `form` replace what would be drawn. Raises VirtualRobotError.
     """
@@ -232,5 +233,5 @@ def generate(
         for job, columns in day.run().items():
             write_csv(folder / day.entry(job)["file"], columns)
         write_head(folder, f"bench-{seed}", day.known(), [day.entry(job) for job in range(len(day.jobs))])
-    (seal or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(day.label.as_dict()))
+        (seal or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(day.label.as_dict()))
     return day.label
