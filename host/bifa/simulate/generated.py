@@ -15,15 +15,19 @@ import stat
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numba
+from numba.core.caching import FunctionCache
 
 from bifa.errors import BifaError
-from bifa.files import write_text
+from bifa.files import TargetError, written
 
 _KEEP_S = 30 * 86400.0
+_ROOM_BYTES = 8 << 20  # more than numba's compiled code of any generated file
 
 
 def digest(*texts: str) -> str:
@@ -38,24 +42,24 @@ def folder() -> Path:
         users = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         chosen = Path(os.environ.get("BIFA_CACHE_DIR") or Path(users) / "bifa")
         chosen.mkdir(parents=True, exist_ok=True)
-        if os.access(chosen, os.W_OK):
-            return chosen
-    try:
-        return temporary_folder()
-    except OSError as error:
-        raise BifaError("no writable folder for compiled code: set BIFA_CACHE_DIR to one") from error
+        tempfile.TemporaryFile(dir=chosen).close()  # permissions reveal neither a quota nor a server that refuses
+        return chosen
+    return temporary_folder()
 
 
 @functools.cache
 def temporary_folder() -> Path:
     """A folder shared by the user's processes if only this user can write to it, since its code is executed; otherwise
-    one for this process alone."""
-    candidate = Path(tempfile.gettempdir()) / f"bifa-{os.getuid() if hasattr(os, 'getuid') else 0}"
+    one for this process alone. Raises BifaError if there is no folder for temporary files."""
     with contextlib.suppress(OSError):
+        candidate = Path(tempfile.gettempdir()) / f"bifa-{os.getuid() if hasattr(os, 'getuid') else 0}"
         candidate.mkdir(mode=0o700, exist_ok=True)
         if _is_ours_alone(candidate):
             return candidate
-    return Path(tempfile.mkdtemp(prefix="bifa-"))
+    try:
+        return Path(tempfile.mkdtemp(prefix="bifa-"))
+    except OSError as error:
+        raise BifaError("no writable folder for compiled code: set BIFA_CACHE_DIR to one") from error
 
 
 def _is_ours_alone(there: Path) -> bool:
@@ -65,19 +69,34 @@ def _is_ours_alone(there: Path) -> bool:
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
+def cached(name: str, make: Callable[[Path], Any]) -> Path:
+    """Path of the generated file `name`. If it does not exist, `make(aside)` writes it, in a temporary folder if the
+    user's cache is full. Raises TargetError if both are."""
+    try:
+        return _made(folder() / name, make)
+    except TargetError:
+        return _made(temporary_folder() / name, make)
+
+
+def _made(path: Path, make: Callable[[Path], Any]) -> Path:
+    if not path.exists():
+        with written(path) as aside:
+            aside.write_bytes(bytes(_ROOM_BYTES))
+            make(aside)
+        forget_old(path.parent)
+    return path
+
+
 def load(stem: str, source: str) -> ModuleType:
     """Import `source` as a module, writing its file first if it does not exist. `stem` and a hash form its name."""
     name = f"bifa_{stem}_{digest(source)}"
     if name in sys.modules:
         return sys.modules[name]
-    path = folder() / f"{name}.py"
+    path = cached(f"{name}.py", lambda aside: aside.write_text(source, encoding="utf-8", newline="\n"))
     for compiled in path.parent.glob(f"__pycache__/{name}.*.nb[ci]"):
         with contextlib.suppress(OSError):
             if not compiled.stat().st_size:  # after a power cut; numba would fail
                 compiled.unlink()
-    if not path.exists():
-        write_text(path, source)
-        forget_old(path.parent)
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ImportError(f"{path} is not a Python module")
@@ -88,6 +107,9 @@ def load(stem: str, source: str) -> ModuleType:
     except BaseException:
         del sys.modules[name]
         raise
+    for function in vars(module).values():
+        if isinstance(getattr(function, "_cache", None), FunctionCache):  # what it cannot keep is compiled each time
+            function._cache._guard_against_spurious_io_errors = lambda: contextlib.suppress(OSError)
     return module
 
 

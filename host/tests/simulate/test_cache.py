@@ -1,6 +1,8 @@
 """Compiled code is cached, and never older than its sources."""
 
+import errno
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -23,6 +25,7 @@ simulate.walk(robot.nominal(), robot.BASELINE, 1)
 assert sum(entries.walk_record.stats.cache_hits.values()) == 1
 assert not entries.walk_record.stats.cache_misses
 """
+CACHED = "from numba import njit\n\n\n@njit(cache=True)\ndef one():\n    return 1\n"
 
 
 def test_a_second_start_compiles_nothing():
@@ -40,8 +43,7 @@ def test_a_changed_source_gets_another_file(tmp_path, monkeypatch):
     assert len(list(tmp_path.glob("bifa_sample_*.py"))) == 2
 
 
-def test_a_full_disk_is_named(tmp_path, monkeypatch):
-    monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path))
+def test_a_full_disk_is_named(no_cache):
     resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
@@ -50,15 +52,41 @@ def test_a_full_disk_is_named(tmp_path, monkeypatch):
             generated.load("sample", "value = 1" + 100 * " " + "\n")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert not list(tmp_path.iterdir())
+    assert not list(no_cache.rglob("*.*"))
+
+
+@pytest.mark.parametrize("why", ["ENOSPC", "EDQUOT", "EROFS", "EACCES"])
+@pytest.mark.parametrize("refused", ["any file", "a large file"])
+def test_code_that_the_cache_does_not_take_lives_in_the_temporary_folder(no_cache, tmp_path, monkeypatch, refused, why):
+    monkeypatch.setenv("BIFA_CACHE_DIR", cache := str(tmp_path / "cache"))
+    owner, name = (tempfile, "TemporaryFile") if refused == "any file" else (Path, "write_bytes")
+    real = getattr(owner, name)
+
+    def refuse(*arguments, **options):
+        if cache in str(options or arguments):
+            raise OSError(getattr(errno, why), os.strerror(getattr(errno, why)))
+        return real(*arguments, **options)
+
+    monkeypatch.setattr(owner, name, refuse)
+    module = generated.load(f"sample_{owner.__name__}_{why}", CACHED)
+    assert no_cache in Path(module.__file__).parents
+    assert module.one() == 1
+    assert list(Path(module.__file__).parent.glob(f"__pycache__/{module.__name__}*.nbc"))
+
+
+def test_code_that_cannot_be_kept_is_compiled_at_each_start(tmp_path, monkeypatch):
+    monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path))
+    module = generated.load("unkept", CACHED)
+    shutil.rmtree(tmp_path / "__pycache__")
+    (tmp_path / "__pycache__").write_text("numba can make no folder here")
+    assert module.one() == 1
 
 
 @pytest.mark.parametrize("empty", ["__pycache__/*.nbi", "__pycache__/*.nbc"])
 def test_a_file_of_numba_that_a_power_cut_left_empty_is_written_again(tmp_path, monkeypatch, empty):
     monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path))
-    source = "from numba import njit\n\n\n@njit(cache=True)\ndef one():\n    return 1\n"
     for _ in range(2):
-        module = generated.load("sample", source)
+        module = generated.load("sample", CACHED)
         assert module.one() == 1
         del sys.modules[module.__name__]
         (path,) = tmp_path.glob(empty)

@@ -75,14 +75,14 @@ def library(chosen: Target) -> Path:
     """Path of the compiled kernel, compiled now if missing. Raises NoKernelError if that fails."""
     texts = [(HERE / name).read_text("utf-8") for name in _OWN]
     name = f"bifa_lanes_{generated.digest(*entries.sources(), *texts, *FLAGS, *chosen.flags)}_{chosen.lanes}.so"
-    path = generated.folder() / name
-    if not path.exists():
+
+    def make(aside: Path) -> None:
         compiler()
         what = f"{chosen.lanes}-lane{' single-precision' if SINGLE in chosen.flags else ''} simulator"
         print(f"Compiling the {what} (first run only)...", file=sys.stderr, flush=True)
-        compile_to(path, chosen)
-        generated.forget_old(path.parent)
-    return path
+        compile_to(aside, chosen)
+
+    return generated.cached(name, make)
 
 
 def compile_to(path: Path, chosen: Target) -> None:
