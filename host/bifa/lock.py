@@ -37,20 +37,30 @@ def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
     path = folder.with_name(f".{folder.name}.lock")
     file = _acquire(path, folder)
     try:
-        file.truncate(0)
-        who = {
-            "pid": os.getpid(),
-            "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
-            "host": socket.gethostname(),
-            "since": datetime.now().isoformat(sep=" ", timespec="seconds"),
-        }
-        file.write(json.dumps(who, indent=1) + "\n")
-        file.flush()
+        _sign(file, folder)
         yield
     finally:
         with suppress(OSError):  # Windows cannot remove an open file; it stays behind as a stale lock
             path.unlink()
-        file.close()
+        with suppress(OSError):  # on a full disk, as when it was signed
+            file.close()
+
+
+def _sign(file: IO[str], folder: Path) -> None:
+    """Write this program's identity into the lock file."""
+    who = {
+        "pid": os.getpid(),
+        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "host": socket.gethostname(),
+        "since": datetime.now().isoformat(sep=" ", timespec="seconds"),
+    }
+    try:
+        file.truncate(0)
+        file.write(json.dumps(who, indent=1) + "\n")
+        file.flush()
+    except OSError as error:
+        why = f"{folder} cannot be written ({error.strerror}); free some space, or choose another folder"
+        raise LockedError(why) from None
 
 
 def _acquire(path: Path, folder: Path) -> IO[str]:

@@ -52,6 +52,18 @@ def test_what_a_killed_program_has_left_is_stale(tmp_path):
         assert json.loads(lock_of(folder).read_text())["pid"] == os.getpid()
 
 
+def test_a_full_disk_is_told_with_the_folder(tmp_path):
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
+    try:
+        with pytest.raises(LockedError, match=r"/campaign cannot be written \(.*free some space"):
+            locked(tmp_path / "campaign").__enter__()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
+
+
 def test_one_of_many_gets_it_and_each_in_turn(tmp_path):
     """Programs that acquire and release the lock continually never hold it at once, and all of them finish."""
     code = """

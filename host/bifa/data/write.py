@@ -4,14 +4,16 @@ import os
 import re
 import secrets
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from bifa.files import TargetError, named, write_text
+from bifa.files import named
+from bifa.printable import counted
 
 from .dataset import Dataset, Trial
 from .errors import DatasetError
@@ -33,18 +35,31 @@ def write_dataset(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
     """
     target = Path(folder)
     refuse_existing(target)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    scratch = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    scratch.mkdir()
-    try:
-        for trial in dataset.trials:
-            _write_csv(scratch, trial)
-        _write_toml(scratch, dataset)
-        read_dataset(scratch)
+    with _scratch(target.with_name(f".{target.name}.{secrets.token_hex(4)}"), f"{target} cannot be written") as scratch:
+        _fill(scratch, dataset)
         _publish(scratch, target)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
     return target
+
+
+@contextmanager
+def _scratch(folder: Path, refused: str) -> Iterator[Path]:
+    """A folder for the block, removed after it. An OSError in the block becomes a DatasetError that begins with
+    `refused`."""
+    try:
+        folder.mkdir(parents=True)
+        yield folder
+    except OSError as error:
+        raise DatasetError(f"{refused} ({error.strerror or error})") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _fill(folder: Path, dataset: Dataset) -> None:
+    """Write all files of a data set, and read them back."""
+    for trial in dataset.trials:
+        _write_csv(folder, trial)
+    _write_toml(folder, dataset)
+    read_dataset(folder)
 
 
 def partial_of(folder: Path) -> Path:
@@ -151,15 +166,15 @@ def add_trial(dataset: Dataset, trial: Trial) -> Dataset:
             f"{folder} no longer holds {listed(gone)}, so {trial.file} is not added: was it removed or renamed? Put it "
             "back, then resume"
         )
+    kept = f"{folder} keeps {counted(len(dataset.trials), 'earlier trial')} to resume from"
     probe = folder / f"{_PROBE}{secrets.token_hex(4)}"
-    write_dataset(probe, replace(dataset, path=None, trials=(trial,)))
-    try:
+    with _scratch(probe, f"{kept}, but {trial.file} cannot be written"):
+        _fill(probe, replace(dataset, path=None, trials=(trial,)))
+        _write_toml(probe, grown)
         target = folder / trial.file
         target.parent.mkdir(parents=True, exist_ok=True)
         os.replace(probe / trial.file, target)
-        _write_toml(folder, grown)
-    finally:
-        shutil.rmtree(probe, ignore_errors=True)
+        os.replace(probe / TABLE_FILE, folder / TABLE_FILE)
     return grown
 
 
@@ -218,8 +233,7 @@ def _head(trial: Trial) -> dict[str, Any]:
 
 
 def _write_durably(path: Path, text: str) -> None:
-    """Write a file completely or not at all; raises DatasetError if it cannot be written."""
-    try:
-        write_text(path, text)
-    except TargetError as error:
-        raise DatasetError(str(error)) from None
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())

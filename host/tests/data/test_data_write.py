@@ -144,6 +144,18 @@ def test_an_interrupted_add_leaves_the_session_as_it_was(tmp_path, monkeypatch):
     assert [trial.repeat for trial in resumed.finish().trials] == [1, 2]
 
 
+def test_a_full_disk_names_the_trial_and_what_is_kept(tmp_path, monkeypatch):
+    writer = DatasetWriter(tmp_path / "day", "full")
+    writer.add(make_trial(repeat=1))
+    before = {path.name: path.read_bytes() for path in writer.partial.iterdir()}
+    monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError(28, "No space left on device")))
+    file = make_trial(repeat=2).file
+    words = rf"^\S+/day\.partial keeps 1 earlier trial to resume from, but {file} cannot be written \(No space left"
+    with pytest.raises(DatasetError, match=words):
+        writer.add(make_trial(repeat=2))
+    assert {path.name: path.read_bytes() for path in writer.partial.iterdir()} == before
+
+
 def test_a_session_whose_folder_is_renamed_meanwhile_is_not_split_in_two(tmp_path):
     writer = DatasetWriter(tmp_path / "day", "moved")
     writer.add(make_trial(repeat=1))

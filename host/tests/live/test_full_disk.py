@@ -45,7 +45,11 @@ def test_output_onto_a_full_disk_ends_in_a_sentence_with_valves_off(onto_a_full_
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
 
 
-@pytest.mark.parametrize("command", [["gaits"], ["record", "--out", "{out}", "--port", "virtual"]])
+@pytest.mark.parametrize(
+    "command",
+    [[], ["--help"], ["--version"], ["fit", "-h"], ["gaits"], ["record", "--out", "{out}", "--port", "virtual"]],
+    ids=" ".join,
+)
 def test_so_does_that_of_a_command_that_moves_nothing_or_has_not_yet(onto_a_full_disk, command, tmp_path):
     onto_a_full_disk(*(word.format(out=tmp_path / "walks") for word in command))
 
