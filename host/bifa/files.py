@@ -48,6 +48,9 @@ def _check_targets(
     read = {path.resolve() for path in inputs if path is not None}
     targets, made = ([path for path in paths if path is not None] for paths in (files, folders))
     _refuse_same(targets, made)
+    for path in (*targets, *made):
+        if str(path).startswith("-"):  # also a forgotten value, as in `--out --quick`
+            raise TargetError(f"{path} would be taken for an option by the next command; choose another name")
     for path in targets:
         parent = path.resolve().parent
         if path.is_dir():

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import rich.console
-from rich.progress import TextColumn
+from rich.progress import Progress, ProgressColumn, TextColumn
 from rich.segment import Segment
 from rich.status import Status
 from rich.text import Text
@@ -56,6 +56,12 @@ class Countdown:
         if self._status is not None:
             self._status.stop()
         self._status, self._what = None, ""
+
+
+def passing_bars(console: Console, *columns: ProgressColumn) -> Progress:
+    """Return a progress display that vanishes at its end, and prints nothing to a file or a pipe, which may have no
+    reader any more."""
+    return Progress(*columns, console=console, transient=True, disable=not console.is_interactive)
 
 
 def words(template: str, **options: Any) -> TextColumn:

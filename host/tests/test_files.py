@@ -82,6 +82,11 @@ def test_targets_are_refused_before_work(tmp_path):
         check_targets(tmp_path)
     with pytest.raises(TargetError, match="is a file, so "):
         check_targets(folders=(tmp_path / "file" / "pictures",))
+    check_targets(tmp_path / "-x.toml", folders=(tmp_path / "--quick",))
+    with pytest.raises(TargetError, match=r"^-x\.toml would be taken for an option"):
+        check_targets(Path("-x.toml"))
+    with pytest.raises(TargetError, match=r"^--quick would be taken for an option"):
+        check_targets(folders=(Path("--quick"),))
     for letters in (248, 300):  # the file that is written at first has a longer name than the target
         for place in ({}, {"folders": (tmp_path / ("d" * 300),)}):
             with pytest.raises(TargetError, match=r"\(File name too long\); choose another place"):

@@ -61,8 +61,13 @@ def resolve(
 
 def refuse_leftovers(folder: Path) -> None:
     """Raise DatasetError if an earlier `resolve` left an experiment, before minutes are spent on a diagnosis."""
-    if left := sorted(path.name for path in folder.glob("separate-*") if path.suffix != ".partial"):
+    if left := finished(folder):
         raise DatasetError(f"{folder} holds {', '.join(left)} from an earlier --resolve: move that folder away first")
+
+
+def finished(folder: Path) -> list[str]:
+    """Names of the experiments that a `resolve` has finished in `folder`."""
+    return sorted(path.name for path in folder.glob("separate-*") if path.suffix != ".partial")
 
 
 def planned(chosen: NextExperiment) -> tuple[PlannedTrial, ...]:

@@ -6,10 +6,12 @@ Heavy imports (numba, matplotlib, SciPy) belong inside the command's function, s
 import importlib
 import inspect
 import io
+import os
 import pkgutil
 import re
 import shutil
 import sys
+from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
@@ -22,7 +24,18 @@ from bifa.printable import printable
 
 
 class _Commands(typer.core.TyperGroup):
-    """End every command on Ctrl-C with a line on what was kept, and on a full disk with an error that says so."""
+    """Refuse empty arguments; end every command on Ctrl-C with a line on what was kept, and on a full disk with an
+    error that says so."""
+
+    def make_context(self, *args: Any, **kwargs: Any) -> Any:
+        with writable():  # --help and --version print while the arguments are parsed
+            return super().make_context(*args, **kwargs)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        for before, word in pairwise(["bifa", *args]):
+            if not word or re.fullmatch(r"--[\w-]+=", word):  # for a path, it would be the working folder
+                raise typer.BadParameter(f"nothing is given after {word or before}: was a variable not set?")
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -39,6 +52,10 @@ class _Commands(typer.core.TyperGroup):
 
 
 _PANELS = 80  # terminal columns; on narrower terminals rich's panels would truncate names
+# rich and typer accept a width of 0, and end in a traceback if it is no number.
+for _width in ("COLUMNS", "TERMINAL_WIDTH"):
+    if os.environ.get(_width, "80") not in map(str, range(40, 1001)):
+        del os.environ[_width]
 
 app = typer.Typer(
     name="bifa",

@@ -94,11 +94,13 @@ def requires(needed: str, **options: object) -> None:
 
 
 def kept(out: Path, what: str) -> str:
-    """Describe what an interrupted recording has left on disk; `what` names one of its files."""
+    """Describe what an interrupted recording has left on disk, and how to resume it; `what` names one of its files."""
     from bifa.data.write import partial_of
 
     partial = partial_of(out)
-    return f"{partial} keeps {counted(len(list(partial.glob('*.csv'))), what)}"
+    if not partial.exists():
+        return "nothing has been recorded yet"
+    return f"{partial} keeps {counted(len(list(partial.glob('*.csv'))), what)}; run the same command to resume"
 
 
 @contextmanager

@@ -90,13 +90,13 @@ def campaign(
     if is_offered(port):
         requires("a serial port", watch=watch)
 
-    from bifa.campaign.setup import Effort, Setup
-    from bifa.measure.bench_file import load_or_ask_known, parse_known
-
     console = Console()
-    options = {"sealed": seed, "profile": profile} if port == "virtual" else {}
-    setup = Setup(port, seed, options, parse_known(known))
     with stoppable(lambda: f"{kept_on_disk(out)}. Run the same command to resume"):
+        from bifa.campaign.setup import Effort, Setup
+        from bifa.measure.bench_file import load_or_ask_known, parse_known
+
+        options = {"sealed": seed, "profile": profile} if port == "virtual" else {}
+        setup = Setup(port, seed, options, parse_known(known))
         if setup.is_by_hand:
             desk, hands = at_desk(console, watch, bench)
             setup = replace(setup, known={**load_or_ask_known(bench, desk), **setup.known}, hands=hands)

@@ -39,15 +39,16 @@ def check(
     with console.status("reading"):
         content = read_dataset(dataset)
         findings = check_dataset(content)
+    if pictures is not None:  # before anything is printed: output that nobody reads must not lose them
+        from bifa.report.datasets import plot_dataset
+
+        with console.status("drawing"), written_into(pictures) as aside:
+            written = plot_dataset(content, aside)
     _print_contents(console, content)
     _print_findings(console, findings)
     if not findings:
         console.print("Nothing looks wrong.")
     if pictures is not None:
-        from bifa.report.datasets import plot_dataset
-
-        with console.status("drawing"), written_into(pictures) as aside:
-            written = plot_dataset(content, aside)
         console.print(f"{counted(len(written), 'picture')} in {pictures}")
     if strict and findings:
         raise typer.Exit(1)

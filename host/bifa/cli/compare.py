@@ -28,6 +28,10 @@ def compare(
         from bifa.report.terminal import print_table
 
         found = side_by_side.read_runs(runs)
+    if report is not None:  # before anything is printed: output that nobody reads must not lose it
+        from bifa.report.page import write_page
+
+        write_page(side_by_side.compare_page(found), report)
     print_table(console, side_by_side.verdict_table(found))
     print_table(console, side_by_side.speed_table(found))
     print_table(console, side_by_side.error_table(found))
@@ -35,7 +39,4 @@ def compare(
     for which in found[0].gaits:
         print_table(console, side_by_side.gait_table(found, which))
     if report is not None:
-        from bifa.report.page import write_page
-
-        write_page(side_by_side.compare_page(found), report)
         console.print(f"report: {report}", soft_wrap=True)

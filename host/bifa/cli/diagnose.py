@@ -15,11 +15,11 @@ import typer
 from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
 from bifa import cluster
-from bifa.cli._options import BASE_MODEL, BENCH_FILE, DATASET, WATCH, port_option, requires
+from bifa.cli._options import BASE_MODEL, BENCH_FILE, DATASET, WATCH, kept, port_option, requires, stoppable
 from bifa.cli.campaign import at_desk
 from bifa.cli.check import warn_of_findings
 from bifa.files import check_targets, named, write_text
-from bifa.screen import Console, words
+from bifa.screen import Console, passing_bars, words
 
 if TYPE_CHECKING:
     from bifa.data import Dataset
@@ -108,7 +108,7 @@ def diagnose(
         from bifa.report.words import spoken
         from lacuna.diagnosis import diagnose as engine
 
-    with Progress(SpinnerColumn(), words("{task.description}"), TimeElapsedColumn(), console=console) as progress:
+    with passing_bars(console, SpinnerColumn(), words("{task.description}"), TimeElapsedColumn()) as progress:
         task = progress.add_task("fitting stiffness curves")
 
         def report_progress(what: str, share: float = 0.0) -> None:
@@ -127,15 +127,25 @@ def diagnose(
             found = run_diagnosis(measured)
             if resolve:
                 rigs = partial(_opened, measured, port, progress)
-                try:
-                    measured, found, _ = further.resolve(
-                        measured, found, run_diagnosis, rigs, resolved, report_progress, hands
-                    )
-                except BaseException:  # whatever happened to the rig, report what the data say
-                    progress.stop()
-                    _report(console, measured, found, json, out, report)
-                    raise
+                with stoppable(lambda: _kept(resolved)):
+                    try:
+                        measured, found, _ = further.resolve(
+                            measured, found, run_diagnosis, rigs, resolved, report_progress, hands
+                        )
+                    except BaseException:  # whatever happened to the rig, report what the data say
+                        progress.stop()
+                        _report(console, measured, found, json, out, report)
+                        raise
     _report(console, measured, found, json, out, report)
+
+
+def _kept(resolved: Path) -> str:
+    """Describe what an interrupted --resolve has left on disk, and how to go on."""
+    from bifa.campaign import resolve as further
+
+    if done := further.finished(resolved):
+        return f"{resolved} keeps {', '.join(done)}; move it away to run --resolve again, which begins anew"
+    return kept(resolved / "separate-1", "finished trial")
 
 
 def _report(

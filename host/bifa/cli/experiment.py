@@ -154,7 +154,7 @@ def experiment(
         console.print(_import(instrument, telemetry, trials, out, known, add, bench or BENCH_FILE))
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
-    with stoppable(lambda: f"{kept(out, 'finished trial')}; run the same command to resume"):
+    with stoppable(lambda: kept(out, "finished trial")):
         _run(console, port, options, out, trials, name, parse_known(known), watch, bench)
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
+from rich.progress import SpinnerColumn, TimeElapsedColumn
 
 from bifa.cli._options import BASE_MODEL, DATASET, PICTURES, REPORT
 from bifa.cli.check import warn_of_findings
 from bifa.files import check_targets, written_into
 from bifa.printable import counted
-from bifa.screen import Console, words
+from bifa.screen import Console, passing_bars, words
 
 EXAMPLES = (
     "bifa fit out/bench --out model.toml",
@@ -46,8 +46,7 @@ def fit(
         measured = read_dataset(dataset)
         warn_of_findings(console, measured)
     begun = time.perf_counter()
-    columns = (SpinnerColumn(), words("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
+    with passing_bars(console, SpinnerColumn(), words("{task.description}"), TimeElapsedColumn()) as progress:
         task = progress.add_task("reading")
         found = identify(
             measured,

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import BarColumn, Progress, TimeElapsedColumn
+from rich.progress import BarColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bifa import cluster
 from bifa.cli._options import PICTURES, Method, file_option
 from bifa.files import check_targets, named, written_into
-from bifa.screen import Console, warning, words
+from bifa.screen import Console, passing_bars, warning, words
 
 if TYPE_CHECKING:
     from bifa.gait.pool import Simulations
@@ -95,22 +95,24 @@ def optimize(
         for one in settings:
             with search_progress(console) as progress:
                 found = optimize(robot, pool, one, progress(f"seed {one.seed}"))
+            optima.append(found)
+            best = max(optima, key=lambda o: o.quantile_mm_s if robust else o.nominal_mm_s)
+            # before anything is printed: output that nobody reads must not lose it
+            save_gait(out, best.gait, provenance(best, robot.name, "bifa optimize"))
             console.print(
                 f"seed {one.seed}: {found.nominal_mm_s:.2f} mm/s on the model, 10th percentile "
                 f"{found.quantile_mm_s:.2f} mm/s; {found.evaluations} gaits, {found.simulations} simulations"
             )
             if found.doubt:
                 console.print(warning(str(found.doubt)))
-            optima.append(found)
-        best = max(optima, key=lambda o: o.quantile_mm_s if robust else o.nominal_mm_s)
-        save_gait(out, best.gait, provenance(best, robot.name, "bifa optimize"))
+        if not no_pictures:
+            what = "pictures: what changed and why, sensitivity, front, distribution"
+            with console.status(what), written_into(folder) as aside:
+                reasons = draw_pictures(robot, pool, best, aside)
         console.print(_summary(best))
         console.print(f"gait: {out}")
         if no_pictures:
             return
-        what = "pictures: what changed and why, sensitivity, front, distribution"
-        with console.status(what), written_into(folder) as aside:
-            reasons = draw_pictures(robot, pool, best, aside)
         for sentence in reasons:
             console.print(f"- {sentence}")
         console.print(f"pictures: {folder}")
@@ -128,7 +130,7 @@ def pictures_beside(out: Path) -> Path:
 def search_progress(console: Console) -> Iterator[Callable[[str], Callable[[str, float, float], None]]]:
     """Show progress bars; yields a function that adds one by its title and returns the callback for `optimize`."""
     columns = (words("{task.description}"), BarColumn(), TimeElapsedColumn(), words("{task.fields[best]}"))
-    with Progress(*columns, console=console, transient=True) as progress:
+    with passing_bars(console, *columns) as progress:
 
         def begin(title: str) -> Callable[[str, float, float], None]:
             task = progress.add_task(title, total=1.0, best="")

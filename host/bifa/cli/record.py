@@ -59,7 +59,7 @@ def record(
         if has_instruments:
             requires("a rig without instruments", seconds=seconds)
             console.print(f"gait: {gait or 'the baseline'}, {steps}")
-            with stoppable(lambda: f"{kept(out, 'finished walk')}; run the same command to resume"):
+            with stoppable(lambda: kept(out, "finished walk")):
                 record_walks(rig, port, out, gait, cycles or _CYCLES, repeats or _REPEATS, console)
     if not has_instruments:
         requires("a rig with instruments", cycles=cycles, repeats=repeats)

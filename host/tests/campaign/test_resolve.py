@@ -62,6 +62,7 @@ def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
 def diagnosing(monkeypatch, tmp_path):
     """Run `bifa diagnose` on an empty day: its exception, and a list of what was diagnosed and reported."""
     done = []
+    (tmp_path / "day").mkdir()
     monkeypatch.setattr("bifa.data.read_dataset", lambda folder: DAY)
     monkeypatch.setattr("bifa.identify.start.prepare", lambda *_: SimpleNamespace())
     monkeypatch.setattr(
@@ -70,22 +71,45 @@ def diagnosing(monkeypatch, tmp_path):
     monkeypatch.setattr("bifa.identify.doubts.with_doubts", lambda found, system: found)
     monkeypatch.setattr("lacuna.diagnosis.record.as_record", str)
     monkeypatch.setattr("bifa.cli.diagnose.print_diagnosis", lambda console, record, labels: done.append(record))
-    return lambda *options: (CliRunner().invoke(app, ["diagnose", str(tmp_path), *options]).exception, done)
+    return lambda *options: (CliRunner().invoke(app, ["diagnose", str(tmp_path / "day"), *options]), done)
 
 
 def test_where_it_cannot_resolve_is_said_before_the_diagnosis(diagnosing, tmp_path):
     for options in (["--port", "nowhere"], ["--port", "/dev/nowhere", "--watch", str(tmp_path / "nowhere")]):
-        error, done = diagnosing("--resolve", *options)
-        assert "nowhere" in str(error)
+        result, done = diagnosing("--resolve", *options)
+        assert "nowhere" in str(result.exception)
         assert not done
 
 
 def test_the_verdict_is_told_where_the_rig_fails_after_it(diagnosing, monkeypatch, tmp_path):
     monkeypatch.setattr("bifa.campaign.resolve.resolve", Mock(side_effect=RigError("gone")))
-    error, done = diagnosing("--resolve", "--port", "virtual", "--json", str(tmp_path / "verdict.json"))
-    assert isinstance(error, RigError)
+    result, done = diagnosing("--resolve", "--port", "virtual", "--json", str(tmp_path / "verdict.json"))
+    assert isinstance(result.exception, RigError)
     assert done == ["diagnosed", "the verdict"]
     assert (tmp_path / "verdict.json").read_text() == '"the verdict"\n'
+
+
+@pytest.mark.parametrize(
+    ("left", "words"),
+    [
+        ([], "nothing has been recorded yet"),
+        (["separate-1.partial/pull_1.csv"], "keeps 1 finished trial; run the same command to resume"),
+        (["separate-1/pull_1.csv", "separate-2.partial/pull_1.csv"], "day-resolved keeps separate-1; move it away"),
+    ],
+)
+def test_ctrl_c_in_a_further_experiment_says_what_is_kept_after_the_verdict(
+    diagnosing, monkeypatch, tmp_path, left, words
+):
+    def interrupted(*_):
+        for name in left:
+            (path := tmp_path / "day-resolved" / name).parent.mkdir(parents=True)
+            path.write_text("")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bifa.campaign.resolve.resolve", interrupted)
+    result, done = diagnosing("--resolve", "--port", "virtual")
+    assert (result.exit_code, done) == (130, ["diagnosed", "the verdict"])
+    assert words in result.output
 
 
 @pytest.mark.uno

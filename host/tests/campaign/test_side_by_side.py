@@ -2,12 +2,15 @@
 
 import json
 import re
+from unittest.mock import Mock
 
 import pytest
+from typer.testing import CliRunner
 
 from bifa.campaign.page import GAIT_NAMES
 from bifa.campaign.side_by_side import CompareError, compare_page, parameter_table, read_runs, verdict_table
 from bifa.campaign.stages import PROVENANCE, digest
+from bifa.cli import app
 from bifa.report.page import render
 from tests.report import sample
 
@@ -74,3 +77,10 @@ def test_a_campaign_interrupted_while_it_was_brought_up_to_date_is_refused(tmp_p
     model.write_text(model.read_text() + "\n")
     with pytest.raises(CompareError, match=r"b holds an unfinished campaign: model-completed\.toml changed after"):
         read_runs(runs)
+
+
+def test_output_that_nobody_reads_does_not_lose_the_report(tmp_path, monkeypatch):
+    monkeypatch.setattr("bifa.screen.Console.print", Mock(side_effect=BrokenPipeError))
+    runs = [str(sample.finished(tmp_path / day)) for day in ("monday", "tuesday")]
+    assert CliRunner().invoke(app, ["compare", *runs, "--report", str(tmp_path / "both.html")]).exit_code == 1
+    assert (tmp_path / "both.html").exists()

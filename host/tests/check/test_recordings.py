@@ -1,6 +1,7 @@
 """The findings of `bifa check`: each fault is found where it was put, and a sound data set has none."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -153,6 +154,14 @@ def test_the_command_lists_plots_and_warns(tmp_path):
     assert result.exit_code == 1
     assert "1 picture in" in result.output
     assert "[missing repeats]" in result.output
+
+
+def test_output_that_nobody_reads_does_not_lose_the_pictures(tmp_path, monkeypatch):
+    monkeypatch.setattr("bifa.screen.Console.print", Mock(side_effect=BrokenPipeError))
+    folder = write_dataset(tmp_path / "set", sound())
+    result = CliRunner().invoke(app, ["check", str(folder), "--pictures", str(tmp_path / "pictures")])
+    assert result.exit_code == 1
+    assert len(list((tmp_path / "pictures").glob("*.png"))) == len(EXPERIMENTS)
 
 
 def test_pictures_on_a_full_disk_end_in_a_sentence_and_leave_none(tmp_path, monkeypatch):

@@ -155,7 +155,36 @@ def test_ctrl_c_says_what_became_of_the_work(monkeypatch):
     monkeypatch.setattr("bifa.data.read_dataset", Mock(side_effect=KeyboardInterrupt))
     result = invoke("check", ".")
     assert result.exit_code == 130
-    assert "Interrupted. Finished results are listed above" in result.output
+    assert "Interrupted. Finished results are listed above; no partial files remain." in result.output
+
+
+def test_ctrl_c_while_a_campaign_is_loaded_says_what_it_has_kept_and_how_to_resume(monkeypatch, tmp_path):
+    (tmp_path / "provenance.json").write_text('{"stages": {"measure": {}}}')
+    monkeypatch.setattr("bifa.campaign.setup.Setup", Mock(side_effect=KeyboardInterrupt))
+    result = invoke("campaign", "--out", tmp_path)
+    assert result.exit_code == 130
+    assert f"{tmp_path} keeps the stages measure. Run the same command to resume" in result.output
+
+
+@pytest.mark.parametrize("command", [["campaign", "--out", ""], ["campaign", "--out="], ["check", ""]], ids=" ".join)
+def test_an_empty_name_is_not_the_working_folder(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = invoke(*command)
+    assert result.exit_code == 2
+    assert f"nothing is given after {[word for word in command if word][-1]}: was a variable" in result.output
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["COLUMNS", "TERMINAL_WIDTH"])
+@pytest.mark.parametrize("width", ["0", "1", "-3", "²", "wide", "9" * 5000])
+def test_a_width_that_no_terminal_has_is_not_used(name, width):
+    environment = {key: value for key, value in os.environ.items() if key != "COLUMNS"} | {name: width}
+    for command in (["gaits"], ["gaits", "--help"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "bifa", *command], env=environment, capture_output=True, text=True, encoding="utf-8"
+        )
+        assert done.returncode == 0, done.stderr
+        assert 50 < max(map(len, done.stdout.splitlines())) <= 80
 
 
 def completed(shell: str, words: str) -> str:

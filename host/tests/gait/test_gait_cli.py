@@ -3,6 +3,7 @@
 import tomllib
 from dataclasses import replace
 from typing import get_args
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -59,6 +60,17 @@ def test_pictures_compare_gaits_on_the_robots_of_the_optimums_own_speeds(runs, t
         speeds = distribution(runs, draws, gait_rows([found.gait]), metric)[0]
         np.testing.assert_array_equal(speeds, found.speeds_mm_s[: len(draws)])
     assert len(met) == 3
+
+
+@pytest.mark.parametrize("read", [0, 2])  # two: the line of the run and its doubt, before the pictures are drawn
+def test_output_that_nobody_reads_any_more_does_not_lose_the_gait(runs, tmp_path, monkeypatch, read):
+    found = search.optimize(nominal(), runs, Settings(robust=False, evaluations=24, seed=5))
+    monkeypatch.setattr("bifa.gait.optimize", lambda *_: found)
+    monkeypatch.setattr("bifa.cli.optimize.draw_pictures", lambda *told: (told[-1] / "changes.png").touch() or [])
+    monkeypatch.setattr("bifa.screen.Console.print", Mock(side_effect=[*[None] * read, BrokenPipeError]))
+    assert invoke("optimize", "--out", tmp_path / "gait.toml").exit_code == 1
+    assert load_gait(tmp_path / "gait.toml") == found.gait
+    assert (tmp_path / "gait" / "changes.png").exists() == bool(read)
 
 
 @pytest.mark.parametrize(
