@@ -57,8 +57,8 @@ def _signature(thing: object) -> str:
         found = str(inspect.signature(thing))
     except (TypeError, ValueError):
         return ""
-    found = re.sub(r" -> '?None'?$", "", found)
-    return found.replace("pathlib._local.", "pathlib.")  # as Python 3.13 writes it
+    found = re.sub(r"(: |-> )'([^']*)'", r"\1\2", found)  # of forward references
+    return re.sub(r" -> None$|\b(?:[a-z_]\w*\.)+(?=[A-Z])", "", found)  # a class's module differs between versions
 
 
 if __name__ == "__main__":

@@ -4,8 +4,6 @@ are required to end within 1 % of the best cost found.
     python -m benchmarks.bench_convergence --starts 8 --only inclination
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """The demo with ten seeds: see `benchmarks.demos`. Takes half an hour or more; an interrupted run resumes."""
 
-from __future__ import annotations
-
 from benchmarks import demos
 
 

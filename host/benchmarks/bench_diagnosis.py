@@ -4,8 +4,6 @@ One line per case: wall-clock seconds, meaningful only on an idle machine, besid
 seconds, valid on a busy one.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,8 +1,6 @@
 """Cost of a simulation in lanes, compared with the same one alone in numba, in processor seconds, so that other load on
 the machine does not count. Same robots, same times, same tolerance."""
 
-from __future__ import annotations
-
 import tempfile
 import time
 from dataclasses import replace

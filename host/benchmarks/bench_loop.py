@@ -1,7 +1,5 @@
 """The whole loop on every effect of the library: see `benchmarks.loop`. Takes two hours or more; can be resumed."""
 
-from __future__ import annotations
-
 from benchmarks import loop
 
 

@@ -4,8 +4,6 @@ an effect that nothing explains; and the share of a fit spent in the compiled ke
 Processor seconds are those of all processes; the clock is meaningful only on an idle machine.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

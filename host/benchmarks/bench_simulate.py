@@ -7,8 +7,6 @@ wrong answer is no evaluation, and for the gaits that LSODA finishes, since for 
 was stopped. Times are processor times, so that other load on the machine counts for neither side.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from itertools import pairwise

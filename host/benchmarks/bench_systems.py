@@ -3,8 +3,6 @@
 All get the same records to fit, candidates and simulator; nobody sees the held-out records. See docs/compared.md.
 """
 
-from __future__ import annotations
-
 from benchmarks.systems import bouc_wen, emps, spring, tanks
 from benchmarks.systems.table import compare
 

@@ -14,8 +14,6 @@ Wilson intervals, compared with four baselines that see the same fits: the best 
 forward selection, and sparse regression on the base model's residual.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -1,7 +1,5 @@
 """Figures of a blind trial's records: rates with 95 % Wilson intervals, beside requirements and baselines."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence

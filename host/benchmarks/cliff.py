@@ -7,8 +7,6 @@ all, most, half and few of the possible robots walk with it. Each such gait is w
 firmware. FILE has one line per robot, with which an interrupted run resumes.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import tempfile

@@ -3,8 +3,6 @@
 Three show the mass on a spring of `benchmarks.systems.spring`, one a heated block whose power is limited.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

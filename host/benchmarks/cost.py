@@ -1,7 +1,5 @@
 """Measures of cost that a busy machine does not distort: number of simulations, and processor seconds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from multiprocessing import get_context
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage

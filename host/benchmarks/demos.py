@@ -7,8 +7,6 @@ Each is a whole campaign through the real firmware on a robot with one undisclos
 that an interrupted run resumes; FILE has one line for each, with which it resumes on another machine.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

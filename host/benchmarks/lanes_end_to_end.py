@@ -8,8 +8,6 @@ effect of the library, and for the other diagnoses none, a pair, and one outside
 seconds of the command and its workers, so that other load on the machine counts little.
 """
 
-from __future__ import annotations
-
 import argparse
 import multiprocessing
 import os

@@ -12,8 +12,6 @@ walking. Campaigns stay in OUT, so that an interrupted run resumes; FILE has one
 another machine. A run "walks" if it advances by at least four fifths of the prediction, and by 1 mm/s.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Sequence

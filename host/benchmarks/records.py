@@ -1,7 +1,5 @@
 """Results of a long trial, one line of JSON per set, gzipped if the name ends in .gz, to resume it elsewhere."""
 
-from __future__ import annotations
-
 import gzip
 import json
 from collections.abc import Iterable

@@ -14,8 +14,6 @@ run. FILE has one line per robot, with which a run resumes that was interrupted,
 robots fully. The speeds in the FILE of an earlier search count among the best known in place of long runs and peers.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import time

@@ -9,8 +9,6 @@ FILE is what `benchmarks.small_systems --records` or `benchmarks.blind --records
 that was tried are beside it (.losses.jsonl.gz). No model is simulated: a rule chooses among what the search had found.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import sys

@@ -4,8 +4,6 @@
 `python -m benchmarks.replay --rule`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any

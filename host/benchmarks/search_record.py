@@ -3,8 +3,6 @@
 The only module of the benchmarks that depends on the engine's representation of a search.
 """
 
-from __future__ import annotations
-
 import subprocess
 from functools import cache
 from pathlib import Path

@@ -8,8 +8,6 @@ is repeated with every rule halved and doubled (probabilities at most 0.99). A s
 names exactly the effects that are present and offered.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections import Counter

@@ -14,8 +14,6 @@ beside it, compressed, is what the engine tried (.losses.jsonl.gz), for `python 
 with 95 % Wilson intervals.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -4,8 +4,6 @@ Both ends unpickle what the other sends: whoever answers at the address can run 
 scheduler can run code there. With TLS both have to present a certificate signed by your own authority.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ The operating system releases a lock when the program that holds it ends, howeve
 by a killed program is stale and taken over.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os

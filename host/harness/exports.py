@@ -3,8 +3,6 @@
 Each writer takes columns under the data set's names and returns the bytes of a file; `EXPORTS` has them by preset.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

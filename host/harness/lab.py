@@ -4,8 +4,6 @@ As a program (`python -m harness.lab LINK FOLDER [BENCH]`) it also serves the ro
 its instruments export their records in the formats of the known programs in turn, and it declares each in that file.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

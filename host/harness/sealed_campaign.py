@@ -7,8 +7,6 @@ firmware image in the simulated chip, the link, instruments with clocks of their
 data set and, beside it, its truth in OUT.sealed.toml. An interrupted session resumes.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -6,8 +6,6 @@ parameters that can only be positive by their logarithm, which merely changes si
 are reported in the user's own parameters.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Parsing of numbers in text files: plain decimals, as instruments write them, and nothing else."""
 
-from __future__ import annotations
-
 import re
 
 DECIMAL = re.compile(r"([+-]?)[ \t]*((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)", re.ASCII)

@@ -1,7 +1,5 @@
 """Parameters that are not fitted: fixed at a known value or tied to another parameter."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite

@@ -8,8 +8,6 @@ residual.
 If there are no repeats to show the noise's correlation time, that of the residual is used instead.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable
 

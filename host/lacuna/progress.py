@@ -1,7 +1,5 @@
 """Progress of a diagnosis as one line on the terminal: steps done, steps in total, and the time that is left."""
 
-from __future__ import annotations
-
 import sys
 import time
 from typing import TextIO

@@ -1,7 +1,5 @@
 """`lacuna.diagnose`: from a system and records to a verdict."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor

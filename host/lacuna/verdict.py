@@ -1,7 +1,5 @@
 """The result as the user sees it: text, a page, figures, tables, and the completed model as a function."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

@@ -5,8 +5,6 @@
 generated where libsimavr is missing. Nothing is rebuilt when the objects are newer than their sources.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import sysconfig

@@ -5,8 +5,6 @@ Parameter `p` of an effect is the plant's parameter `<effect>_p`. `sizes` are wh
 has a multiple of them. `drawn` are the remaining parameters, with the range that each is drawn from.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

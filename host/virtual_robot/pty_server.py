@@ -5,8 +5,6 @@ Opening the port of a real Uno resets it through DTR, a line that a pty does not
 pty is opened, which is when the kernel stops reporting the other side as hung up.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import select

@@ -10,8 +10,6 @@ shares no formula with this one or with any library: 48 trials, sizes 0.3 to 1 (
 docs/truths.md).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Candidate effects at the input or output of any kind, none of which is ever present."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Whether a set is decidable: how close each offered explanation can come to the noiseless truth."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 

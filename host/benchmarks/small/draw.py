@@ -1,7 +1,5 @@
 """Draw a set of some kind from its seed: what its owner has, and separately the truth."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Shapes of inputs, roughly between -1 and 1, as functions of time over the duration of a run."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """Figures of the records of small systems: rates with 95 % Wilson intervals, beside peers on the same sets."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 

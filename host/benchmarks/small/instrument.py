@@ -1,7 +1,5 @@
 """Measurement of the output: white and colored noise, rounding, drift, missing samples, an uneven clock."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The input is held between samples in both. Rates and readings are compiled funct
 values `p`; a rate writes into its last argument.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import float64, njit, types, void
 

@@ -1,7 +1,5 @@
 """Description of a kind of system: its owner's model, the candidates, and the truth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What the owner of a system has: a model with its candidates, and records. Nothing here knows the truth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

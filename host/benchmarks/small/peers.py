@@ -1,7 +1,5 @@
 """Other methods on the same sets, with the rivals of `benchmarks.systems`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import combinations
 

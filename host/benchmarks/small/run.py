@@ -1,7 +1,5 @@
 """Run one set through the engine's public interface and the peers; the seal is opened afterwards."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any

@@ -4,8 +4,6 @@ Drawing a set then takes a tenth of a second instead of some seconds, and gives 
 differ in the last digit.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Mapping

@@ -7,8 +7,6 @@ Identification Benchmarks, 2016, doi 10.4121/12967592: their constants, sampling
 noise (0.008 mm). The model has mass, damper and spring. `z` is not measured, so there is nothing to differentiate.
 """
 
-from __future__ import annotations
-
 import sys
 
 import numba

@@ -5,8 +5,6 @@ Benchmarks, 2019. Model and candidates are those of `docs/examples/emps.py`. The
 they are expected beside the checkout.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Count the lines that a person writes, by one rule: lines of code in the named functions, classes and values, without
 blank lines, comments, docstrings and imports."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 from collections.abc import Collection, Iterator

@@ -6,8 +6,6 @@ Equations, candidates and sizes are those of the tests' toy (`host/tests/lacuna/
 that `docs/adding-your-own-system.md` asks for. Damping wobbles by 2 % from run to run.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Collection, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The comparison: every rival on every system, one block of rows per system."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

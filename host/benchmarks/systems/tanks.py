@@ -10,8 +10,6 @@ The outflow of the upper tank enters the lower one at the same rate (their k2 is
 would have no scale. Since the upper tank's level is not measured, there is nothing to differentiate.
 """
 
-from __future__ import annotations
-
 import sys
 
 import numba

@@ -1,8 +1,6 @@
 """Result of a diagnosis on its trials, before and after: errors in the instruments' units, and traces of the
 residuals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

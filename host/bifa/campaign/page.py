@@ -1,7 +1,5 @@
 """The report page of a campaign: the answer first, then the evidence."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

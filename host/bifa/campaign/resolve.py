@@ -1,7 +1,5 @@
 """Run the experiment that separates effects a diagnosis could not, and diagnose again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Several campaigns side by side: models, verdicts and gaits."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Iterable, Mapping, Sequence

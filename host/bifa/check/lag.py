@@ -5,8 +5,6 @@ some 7 psi high and a few samples wide, on a force F that changes slowly. The la
 which its derivative explains the bump best: precise to some 0.2 ms between trials, accurate to 1 ms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

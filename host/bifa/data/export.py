@@ -13,8 +13,6 @@ Only what is declared is read, and nothing is guessed: a column under another na
 a row of units, it has to agree.
 """
 
-from __future__ import annotations
-
 import itertools
 import re
 import tomllib

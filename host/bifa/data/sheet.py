@@ -4,8 +4,6 @@ pandas reads the file; columns that it cannot read as plain numbers are parsed c
 reported with line, column and cell. Nothing is guessed: `SheetForm` says how the file is written.
 """
 
-from __future__ import annotations
-
 import codecs
 import csv
 import io

@@ -1,7 +1,5 @@
 """The library of effects: mechanisms of a real robot that the paper's model lacks. Each effect is one file here."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 `bifa.simulate.hooks` lists the hooks with their arguments, docs/adding-an-effect.md what they return.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from bifa.errors import BifaError

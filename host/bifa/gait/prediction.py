@@ -1,7 +1,5 @@
 """Prediction of a gait: an interval of the speed, and the probability that the robot walks with it at all."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

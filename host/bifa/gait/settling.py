@@ -1,8 +1,6 @@
 """Settling of walks, by one rule for simulated and measured cycles, and the speed of measured walks: net displacement
 per cycle over the settled cycles."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 

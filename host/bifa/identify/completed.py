@@ -1,7 +1,5 @@
 """The identified model with uncertainties, sources of its values, and what a diagnosis added to it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import cast

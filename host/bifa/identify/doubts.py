@@ -1,7 +1,5 @@
 """Reasons to doubt what is fitted to a data set: curves that were not measured, and repeats that are none."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

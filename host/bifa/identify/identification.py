@@ -1,7 +1,5 @@
 """The identification of section IV: starting point, joint fit, and the resulting uncertainty."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from statistics import NormalDist

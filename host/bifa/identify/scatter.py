@@ -1,7 +1,5 @@
 """How walks differ from a fitted model beyond its covariance: between runs, over a session, and unexplained."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import cast

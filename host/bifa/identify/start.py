@@ -5,8 +5,6 @@ beyond the static range; supplies are read off the sensors. Everything else is f
 experiments, by continuation (`lacuna.estimation.graduated`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """First stage: stiffness K and area a from static loading (paper, IV.A.1)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -10,8 +10,6 @@ preset = "bluehill"
 ```
 """
 
-from __future__ import annotations
-
 import time
 import tomllib
 from collections.abc import Iterable

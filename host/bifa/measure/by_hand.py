@@ -3,8 +3,6 @@
 `ByHand` is the `Recorder` of such a session, which otherwise runs as on any rig.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The paper's characterisation experiments (section IV) and walks, on a bench through the real firmware and link."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -8,8 +8,6 @@ samples these were (`strobe` = 0), so that both records show the same pause. Tel
 by the Uno's restart when `bifa record` opened the port: the first edge after that pause is sample 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path

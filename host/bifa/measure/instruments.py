@@ -1,7 +1,5 @@
 """The protocol of a rig's instruments, implemented by a virtual bench, a lab's drivers, or a person at the desk."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Protocol, TypeGuard
 

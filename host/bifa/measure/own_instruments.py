@@ -5,8 +5,6 @@ it has `sync_time_s`, the rising edges of the strobe at the instrument's sync in
 elsewhere. The file appears in or below the watched folder, or its path is typed. Unusable files are reported.
 """
 
-from __future__ import annotations
-
 import contextlib
 import shlex
 import shutil

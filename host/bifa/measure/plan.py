@@ -1,7 +1,5 @@
 """The plan of a session at the bench (paper, section IV): which trials, at which pressures, how often."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

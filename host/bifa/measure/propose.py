@@ -3,8 +3,6 @@
 The findings are proposals for a person to decide on; nothing is read by them without confirmation.
 """
 
-from __future__ import annotations
-
 import codecs
 import csv
 import re

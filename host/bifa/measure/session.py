@@ -4,8 +4,6 @@ An interrupted session can be resumed; a finished data set is never overwritten;
 are off afterwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Small text plots of a trial, to see at the bench whether the recording is as intended."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

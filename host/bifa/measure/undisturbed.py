@@ -1,7 +1,5 @@
 """Reject trials in which the robot was stopped or did anything other than what was commanded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from bifa.errors import BifaError

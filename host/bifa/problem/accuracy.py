@@ -1,7 +1,5 @@
 """The accuracy that the user needs, for each measured quantity."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 

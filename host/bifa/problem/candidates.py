@@ -1,7 +1,5 @@
 """Experiments that the bench could run next, as trials without measurements."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

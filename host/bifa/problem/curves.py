@@ -6,8 +6,6 @@ They are the coordinates `body_shape_01` ... (the least certain first, mostly th
 If the actuator never moves freely, the continuation is left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """The motion of the cross-head: its displacement without the encoder's noise, and its direction."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Regressors: named quantities at every sample of a trial on which a residual may depend."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bifa.problem.inputs import PullInputs, StaticInputs, StepInputs, WalkInputs

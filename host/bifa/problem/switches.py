@@ -7,8 +7,6 @@ used, with an uncertainty of half a sample; round times are no evidence that the
 shows it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

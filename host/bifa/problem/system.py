@@ -4,8 +4,6 @@ Displacements of single actuators are those of the data set (0 where the testing
 from the contracted equilibrium of K, so the two differ by its position, which is 0 if the instruments were zeroed well.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace

@@ -6,8 +6,6 @@ pressure of every step response). Left free, they stall the fit, since hardly an
 has a prior around its nominal value, unless `[known]` declares its value.
 """
 
-from __future__ import annotations
-
 from lacuna.system import Parameter
 
 # Standard deviation of the prior around the model's value, for parameters that [known] may declare.

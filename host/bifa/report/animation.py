@@ -3,8 +3,6 @@
 It does not move if the reader prefers reduced motion, and uses the reader's colour scheme, in a page or as a file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from html import escape
 

@@ -1,7 +1,5 @@
 """Description of a figure, to be drawn as a picture (`picture`) or as a zoomable plot (`page`)."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

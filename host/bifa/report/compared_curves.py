@@ -1,7 +1,5 @@
 """Curves of the first run of each condition: measured, by one or two models, and the difference."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

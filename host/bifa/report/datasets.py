@@ -1,7 +1,5 @@
 """A picture of every condition of a data set, with its repeats superimposed."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

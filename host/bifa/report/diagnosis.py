@@ -1,7 +1,5 @@
 """The page of one diagnosis: verdict, evidence, error before and after, what to measure next."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

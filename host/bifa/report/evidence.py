@@ -1,7 +1,5 @@
 """Charts of a diagnosis and a campaign: error before and after, residuals, learnt curves, robustness of gaits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The page of one fit: parameters with intervals, how well the model describes the data, what is not determined."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from bifa.data.dataset import conditions_of, labels_of

@@ -1,7 +1,5 @@
 """The optimiser's figures: sensitivity, speed against robustness, distribution. All speeds are settled speeds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pages on a terminal, with the same tables and sentences, in the same words."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import rich.box

@@ -1,7 +1,5 @@
 """Walks side by side, like the paper's Fig. 7: CPG outputs, pressures, displacement."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Names in plain words: quantities with units, effects with their sizes, and text without identifiers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from math import floor, log10

@@ -4,8 +4,6 @@ Phases settle at phi_j - phi_i = +psi_ij, so that head and tail run ahead of the
 (positive pressure) when the wrapped phase exceeds 2 pi d_i: a duty is the fraction of the cycle at vacuum.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from bifa.robot.gait import Gait

@@ -1,7 +1,5 @@
 """A gait, the six parameters of the CPG (9) and its thresholds (paper, section V), and gait files."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields

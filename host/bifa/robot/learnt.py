@@ -1,7 +1,5 @@
 """Curves learnt from data and added to terms of the model, for discrepancies that no effect in the library explains."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Model files: TOML, format 1, read strictly."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Set

@@ -7,8 +7,6 @@ The robot leaves the range of a static test (-5.3 mm under vacuum, 57.9 mm at 8.
 at that end.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

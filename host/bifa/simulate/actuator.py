@@ -4,8 +4,6 @@ The pressure state is p = F / a, in psi, which keeps a varying area separate fro
 `actuator` is 0 body, 1 head, 2 tail (the offset in the effects' states `z`); `block` is layout.BODY or SMALL.
 """
 
-from __future__ import annotations
-
 import math
 
 from bifa.simulate import layout

@@ -4,8 +4,6 @@ The only file with a numba cache is generated. It holds a wrapper for each funct
 all compiled sources of the simulator and the effects.
 """
 
-from __future__ import annotations
-
 import inspect
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Advance and slip per cycle for many gaits: the fast metric of the gait search, computed on all cores."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor

@@ -4,8 +4,6 @@ numba caches compiled code by file, but does not notice a change in a function o
 there. Everything with an on-disk cache is therefore in files whose names change with any of their sources.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import hashlib

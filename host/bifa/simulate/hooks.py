@@ -7,8 +7,6 @@ active effects in alphabetical order; an inactive effect costs one bit test.
 docs/adding-an-effect.md lists what each hook returns, with units.
 """
 
-from __future__ import annotations
-
 import inspect
 
 from bifa import effects

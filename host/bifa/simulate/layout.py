@@ -1,7 +1,5 @@
 """Positions of a model's parameters in the flat vector `q` that compiled code reads."""
 
-from __future__ import annotations
-
 import itertools
 from functools import cache
 

@@ -6,8 +6,6 @@ learnt. Outside its range a curve is constant. Each place in the integrator wher
 `Plant.active`, above the effects' bits.
 """
 
-from __future__ import annotations
-
 from bifa.simulate.compiled import merged
 
 # Added to a chamber's pressure rate of eq. (2), in psi/s, over its pressure: while filling, and while emptying

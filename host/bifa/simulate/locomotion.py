@@ -1,7 +1,5 @@
 """Simulation of walks, driven by a timeline of switches."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bifa.simulate import layout

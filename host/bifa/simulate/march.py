@@ -5,8 +5,6 @@ is second-order accurate. If the three steps differ in kind (an end started to s
 in between), the result of the halves is kept unextrapolated, and a tighter tolerance keeps the step short.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

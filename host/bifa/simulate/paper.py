@@ -1,7 +1,5 @@
 """Comparison with every figure that the paper reports and the model can predict."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a gait carries the robot through obstacles, and if not, why (paper, section VI.B)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The flat form of a model that compiled code reads."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Simulated experiments. Each returns the columns of a recorded data set, sampled at the data's times."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

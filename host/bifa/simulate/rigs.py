@@ -1,7 +1,5 @@
 """The mounting of the robot, or of a part of it, in each experiment."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Single actuators on their stands: step response, static loading, anchor pull (paper, section IV)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

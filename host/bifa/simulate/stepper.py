@@ -5,8 +5,6 @@ on it is at most mu_s N; a sliding end meets mu_k N and comes to exact rest when
 the paper's eq. (5), an end creeps below the speed threshold; see docs/model.md.)
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ A table is linear in the curve's coefficients. For a family of curves (a base cu
 change), each member's table is therefore a weighted sum of precomputed tables: microseconds instead of milliseconds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache

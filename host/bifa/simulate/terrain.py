@@ -6,8 +6,6 @@ supports meet each obstacle first, then the tail's. Where the pipe is narrower, 
 earlier. The paper tuned its supports by trial and gives no forces: the values here are assumptions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 A timeline is a table of switches in order of time. A chamber is off (vented) before its first switch.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

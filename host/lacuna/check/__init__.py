@@ -1,7 +1,5 @@
 """Checks that reject misleading input before the search, naming the trial and the channel."""
 
-from __future__ import annotations
-
 from lacuna.check.given import check_names, check_records, coarse_clocks, gaps_in_inputs, other_clocks
 from lacuna.check.model import check_model
 from lacuna.check.repeats import check_inputs, check_times, not_declared, odd_ones, unexplained_differences

@@ -1,8 +1,6 @@
 """Checks of what is given: names must be unique and known, records fit to be compared with a prediction, and times read
 from the right column, not milliseconds taken for seconds."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from math import inf

@@ -1,7 +1,5 @@
 """Parameters that act in steps, such as a delay counted in whole samples: within a step, no prediction changes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from lacuna.check.model import initial, predict_unchecked

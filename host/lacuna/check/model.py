@@ -1,7 +1,5 @@
 """Checks of models that cannot be fitted, by what they return, raise, ignore or remember."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

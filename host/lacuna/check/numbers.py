@@ -1,7 +1,5 @@
 """Helpers that compare columns, name places, and estimate noise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

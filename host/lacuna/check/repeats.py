@@ -1,7 +1,5 @@
 """Checks of repeats that are not true repeats, since their differences become the noise floor."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, product

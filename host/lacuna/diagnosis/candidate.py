@@ -1,7 +1,5 @@
 """A candidate explanation: the base model plus a set of effects, fitted with the same effort as every other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -5,8 +5,6 @@ it. A fixed selection would depend on the order in which the records are given, 
 different kind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

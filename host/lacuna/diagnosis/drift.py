@@ -1,7 +1,5 @@
 """Does a parameter drift over the session? Consecutive repeats hide it; the order of the trials reveals it."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Curves learnt from data at the terms of the equations where the discrepancy lies, for what no effect explains."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 

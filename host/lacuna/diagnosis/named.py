@@ -1,7 +1,5 @@
 """The effects of a verdict with their sizes, intervals and shares of the gap; and the nearest other explanations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from lacuna.diagnosis.candidate import Candidate, refitted_without

@@ -1,7 +1,5 @@
 """Which experiment would distinguish the explanations that this data cannot?"""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

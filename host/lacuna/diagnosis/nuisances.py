@@ -5,8 +5,6 @@ residual, since the nuisance of each run absorbs it. The model still lacks it: r
 predicted.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple

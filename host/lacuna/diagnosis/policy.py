@@ -5,8 +5,6 @@ These rules change verdicts; numerical constants (steps, tolerances, iterations)
 "convention" (a choice that others may make differently; pass another `Policy` to `diagnose`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 from typing import Any
 

@@ -6,8 +6,6 @@ and the best of these to convergence (successive halving). At its optimum a set 
 coarse fit does, it is begun again from the optimum of the subset.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A diagnosis as JSON, format 2."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -6,8 +6,6 @@ a bootstrap: every trial is replaced by a stretch of pure noise, taken from the 
 in which everything shared cancels. No distribution, whiteness or known noise level is assumed.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """How large a fit's residual is, in units of the noise."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """Revise a choice: drop effects that do nothing in it, and add an effect that the nuisances have absorbed, so that no
 trace of it is left in the residual."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from lacuna.diagnosis.candidate import Candidate, judge, refitted_without

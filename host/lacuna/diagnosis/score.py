@@ -6,8 +6,6 @@ the fit's own parameters and nuisances can reproduce is projected out, and effec
 secant can remove when it is scaled by a factor between 0 and 3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Search over sets of effects: score them, race the most promising, and score further effects on top of the best."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,7 +1,5 @@
 """The signature of a residual: where it is and what it depends on, in words and numbers."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

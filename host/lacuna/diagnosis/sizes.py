@@ -1,7 +1,5 @@
 """Starting points of fits with one more effect: a grid of sizes of either sign, at peak frequencies of the residual."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which trials are fitted, which choose between explanations, and which are used only for the final test."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Warnings: reasons to doubt a verdict or its fit, each in a sentence or two."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

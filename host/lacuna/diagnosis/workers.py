@@ -1,7 +1,5 @@
 """Where work is done (in forked children, by an executor's workers, or in this process), and how it is interrupted."""
 
-from __future__ import annotations
-
 import ctypes
 import signal
 import sys

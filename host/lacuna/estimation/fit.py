@@ -1,7 +1,5 @@
 """Fit a structure to trials from several starts with equal effort, and count how many of them agree."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -8,8 +8,6 @@ acts together, errors accumulate over time. If isolating trials fit equally well
 (`Parameter.elsewhere`), all trials together decide.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Resampling of uneven records to even times, and the amount of independent information in correlated samples."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

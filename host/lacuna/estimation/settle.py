@@ -8,8 +8,6 @@ deviation long, with the nuisances refitted to first order, so that the residual
 direction as in the most certain one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -6,8 +6,6 @@ learnt, the data determine its size, which then becomes the prior for the rest (
 Bayesian interpolation, 1992).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The fitted parameters as one vector: those of the base model, some effects of the library, and learnt curves."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property

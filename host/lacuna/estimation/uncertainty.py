@@ -8,8 +8,6 @@ sandwich (Liang and Zeger 1986) takes a condition's residual for its error, alth
 underestimates the variance when conditions are few.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """HTML page of one diagnosis: verdict, evidence, errors before and after, and the next experiment."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of a diagnosis: overview, errors, explanations tried, weights, learnt curves, traces of held-out records."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from typing import Any

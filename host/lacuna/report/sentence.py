@@ -1,7 +1,5 @@
 """A verdict in one sentence, for text and pages."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A verdict as one screen of text, and the origin of the noise floor in words."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any

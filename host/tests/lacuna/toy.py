@@ -7,8 +7,6 @@ measurements. The ripple `r` is in no library: it stands for a mechanism that no
 from run to run.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

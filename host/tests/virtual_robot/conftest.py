@@ -1,7 +1,5 @@
 """Fixtures: tiny images for the simulated chip, compiled by the tests."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import threading

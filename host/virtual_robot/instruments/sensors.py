@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From true values to readings: correlated and wandering noise, resolution, the Uno's 10-bit converter."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The nominal robot, and profiles: how far the simulated bench departs from the paper's equations."""
 
-from __future__ import annotations
-
 from virtual_robot.errors import VirtualRobotError
 
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Python interface of the simulated board. Time is counted in CPU cycles at 16 MHz and passes only in `run_*`."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterator

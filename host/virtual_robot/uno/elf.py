@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Symbol addresses of an AVR ELF image (ELF32, little-endian; System V ABI chapter 4)."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

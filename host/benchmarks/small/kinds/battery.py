@@ -6,8 +6,6 @@ that rises exponentially as the cell runs empty; Arrhenius's law; charging that 
 self-discharge that grows with the charge.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

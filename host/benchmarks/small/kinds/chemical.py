@@ -5,8 +5,6 @@ Model: both reactions of first order. Sources of the truth's forms: Hill's and H
 exponential.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.small.integrate import rate, read

@@ -6,8 +6,6 @@ unbalance with one as well; an amplifier with a rounded limit, and of second ord
 on the direction, too.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.small.integrate import rate, read

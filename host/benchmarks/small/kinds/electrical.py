@@ -5,8 +5,6 @@ curve; Shockley's diodes back to back; Poole and Frenkel's conduction; class 2 c
 branches (Dow, 1958); an amplifier's rounded clipping; a resistance that grows exponentially with its temperature.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.small.integrate import rate, read

@@ -1,7 +1,5 @@
 """Formulas that several truths share; none of them occurs in a model."""
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

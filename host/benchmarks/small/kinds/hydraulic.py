@@ -5,8 +5,6 @@ with the 1.5th power; a porous bottom leaks with a power of 0.85; dead zones and
 cone's area is a square; a pump and its pipe are of second order.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.small.integrate import rate, read

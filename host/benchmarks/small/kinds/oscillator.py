@@ -5,8 +5,6 @@ hyperbolic sine; drag with an exponent of 1.75; Hertz's contact; slip elements i
 elements; an actuator of third order.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.small.integrate import rate, read

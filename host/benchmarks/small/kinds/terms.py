@@ -1,7 +1,5 @@
 """The kinds whose models are sums of terms of measured quantities, for sparse regression."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.systems.problem import Terms

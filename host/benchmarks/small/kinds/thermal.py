@@ -5,8 +5,6 @@ Model: C T' = P - G T. Sources of the truth's forms: Stefan and Boltzmann's law;
 a ladder; transport with dispersion as lags in a row.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.small.integrate import rate, read

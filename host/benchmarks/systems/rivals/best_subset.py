@@ -1,7 +1,5 @@
 """Every set of up to three candidates, fitted with SciPy, and the Bayesian information criterion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """lacuna, used as its documentation shows."""
 
-from __future__ import annotations
-
 import lacuna
 from benchmarks.systems.problem import KnownProblem, RivalAnswer
 

@@ -1,7 +1,5 @@
 """The base model plus a Gaussian process on its residual: a better prediction, but no mechanism named."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

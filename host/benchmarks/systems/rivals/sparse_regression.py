@@ -1,7 +1,5 @@
 """pysindy: differentiate the measurements, regress acceleration on candidate terms, keep the few that matter."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One thread owns the link to the Uno and carries out others' requests; any thread can send a stop at once."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import threading

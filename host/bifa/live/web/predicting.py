@@ -1,7 +1,5 @@
 """Predictions for the gait on the page's sliders: the model's own speed at once, then the interval."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

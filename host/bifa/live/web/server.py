@@ -5,8 +5,6 @@ A page sends and receives everything over one websocket, so that a stop never wa
 a stop also has a path of its own to the port (bifa.live.web.pilot.Stopper).
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import gc

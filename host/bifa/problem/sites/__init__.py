@@ -1,8 +1,6 @@
 """Sites where a learnt curve may be added: the robot's equations, quantities that differ between trials, and the
 instruments. To add a site, add an entry to one of the tables."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from bifa.problem.curves import FittedCurve

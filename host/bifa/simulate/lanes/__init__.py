@@ -3,8 +3,6 @@
 Without a C compiler, the same simulations run in numba.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Compiles the kernel into the user's cache whenever its sources have changed. Takes a few seconds."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

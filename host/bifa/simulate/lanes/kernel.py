@@ -1,7 +1,5 @@
 """Python interface of the compiled kernel: jobs in, rows out."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

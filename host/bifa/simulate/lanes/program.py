@@ -1,7 +1,5 @@
 """The kernel's C source: data structures, the translated functions of the simulator, and the driver."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from functools import cache

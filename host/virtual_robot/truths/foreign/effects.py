@@ -5,8 +5,6 @@ An effect has one or more published forms; the seed draws one, and its other num
 the lab notes (section 9) call modest. Sources: docs/truths.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any

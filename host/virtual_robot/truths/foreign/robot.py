@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A specimen: another robot of the same design, and a bench with undisclosed constants."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
