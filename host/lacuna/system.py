@@ -341,22 +341,6 @@ class System(Protocol):
         """
         ...
 
-    def predict_many(
-        self,
-        thetas: Sequence[Theta],
-        effects: tuple[str, ...],
-        trial: Record,
-        *,
-        coarse: bool = False,
-        corrections: Sequence[Sequence[Correction]] = (),
-        alike: bool = False,
-    ) -> list[Channels]:
-        """Predict a trial for each of `thetas`, each with its own `corrections` if any. Override it, or
-        `predict_trials`, if simulating many at once is cheaper. `alike`: all are close to the first and will be
-        compared with it, as for derivatives, so integrator errors should cancel as far as possible."""
-        trials = [trial] * len(thetas)
-        return self.predict_trials(thetas, effects, trials, coarse=coarse, corrections=corrections, alike=alike)
-
     at_once: int = 1  # number of trials that `predict_trials` simulates at little more than the cost of one
     forks: bool = False  # whether a fork of this process may simulate; False if it has threads or devices of its own
     tells_of_all: bool = False  # whether reported parameters come from a fit to every record, held-out ones included
@@ -374,7 +358,9 @@ class System(Protocol):
         alike: bool = False,
     ) -> list[Channels]:
         """Predict each of `trials` with the corresponding one of `thetas`. Override it, and set `at_once`, if
-        simulating several trials of one experiment side by side is cheaper. `alike`: as in `predict_many`."""
+        simulating several trials of one experiment side by side is cheaper, or one trial with several `thetas`.
+        `alike`: all `thetas` are close to the first and will be compared with it, as for derivatives, so integrator
+        errors should cancel as far as possible."""
         corrections = corrections or [()] * len(thetas)
         return [
             self.predict(theta, effects, trial, coarse=coarse, corrections=learnt)

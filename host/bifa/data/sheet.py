@@ -19,6 +19,7 @@ import numpy as np
 
 from bifa.files import read_bytes
 from lacuna.decimals import BLANKS, decimal, number
+from lacuna.errors import listed
 
 from .errors import DatasetError
 
@@ -169,7 +170,7 @@ class Sheet:
             seen = f"{wanted[count - 1]!r} is followed by {then}, not {wanted[count]!r}"
             break
         else:
-            seen = f"no cell is {wanted[0]!r}; the cells there are {listed(cells) or 'none'}"
+            seen = f"no cell is {wanted[0]!r}; the cells there are {listed(cells, _MAX_LISTED) or 'none'}"
         raise self._error(
             f"above the column names, {seen}: if the export has another unit, rate or form than declared, declare "
             "that, and what is above the names (above)"
@@ -315,9 +316,10 @@ class Sheet:
             named = [place for place, parts in enumerate(self.names) if bare is None or _is_called(parts, bare)]
             places = named[number - 1 : number]
         if not places:
-            raise self._error(f"lacks the column {name}; it has {listed(self.labels()) or 'none'}{self._which}")
+            known = listed(self.labels(), _MAX_LISTED) or "none"
+            raise self._error(f"lacks the column {name}; it has {known}{self._which}")
         if len(places) > 1:
-            found = listed(self.labels()[place] for place in places)
+            found = listed((self.labels()[place] for place in places), _MAX_LISTED)
             raise self._error(
                 f"has the column {name} more than once ({found}): keep the right one, or give more of its name, or "
                 f'"{name} [1]" for the first'
@@ -463,7 +465,7 @@ def _excel(path: Path, sheet: str | int | None, file: str) -> Any:
     except Exception as error:  # openpyxl's own, and zipfile's
         raise DatasetError(f"cannot be read as a workbook (.xlsx): {error}", file=file) from None
     called = f"sheet {sheet + 1}" if isinstance(sheet, int) else f"sheet {sheet!r}"
-    raise DatasetError(f"lacks {called}; it has {listed(names)}", file=file)
+    raise DatasetError(f"lacks {called}; it has {listed(names, _MAX_LISTED)}", file=file)
 
 
 def _texts(frame: Any) -> list[list[str]]:
@@ -474,13 +476,6 @@ def _marked(values: Iterable[Any], decimal: str) -> list[str]:
     """Cells of a workbook as text, numbers with this decimal sign."""
     texts = ["" if value != value or value is None else value for value in values]
     return [str(cell).replace(".", decimal) if isinstance(cell, float) else str(cell) for cell in texts]
-
-
-def listed(names: Iterable[str]) -> str:
-    """Return the first names, and how many more there are."""
-    names = list(names)
-    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
-    return ", ".join(names[:_MAX_LISTED]) + more
 
 
 def _parts(rows: Sequence[Sequence[str]], place: int) -> tuple[str, ...]:

@@ -14,12 +14,12 @@ import tomli_w
 
 from bifa.files import named
 from bifa.printable import counted
+from lacuna.errors import listed
 
 from .dataset import Dataset, Trial
 from .errors import DatasetError
 from .layout import FORMAT, SETTINGS, TABLE_FILE
 from .read import read_dataset
-from .sheet import listed
 
 PARTIAL_SUFFIX = ".partial"
 _PROBE = ".probe."  # prefix of the folder where a trial is written and read back before it counts

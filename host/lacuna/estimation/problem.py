@@ -325,9 +325,9 @@ class Problem:
         corrections = [self.structure.corrections(theta) for theta in thetas]
         for theta, (_, nuisances) in zip(thetas, places, strict=True):
             theta |= self.named(index, nuisances)
-        return self.structure.system.predict_many(
-            thetas, self.structure.effects, self.trials[index], coarse=coarse, corrections=corrections, alike=alike
-        )
+        effects, trials = self.structure.effects, [self.trials[index]] * len(thetas)
+        predict = self.structure.system.predict_trials
+        return predict(thetas, effects, trials, coarse=coarse, corrections=corrections, alike=alike)
 
     def _weigh(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Residuals of a trial, a row for each prediction."""

@@ -39,7 +39,7 @@ def failing(how):
 def at_a_far_gain(system):
     trial = system.trials[0]
     theta = {"gain_K_W": system.coordinate("gain_K_W").fitted(2.0), "tau_s": math.log(12.0)}
-    return system.predict_many([theta], (), trial)[0]["temperature_K"]
+    return system.predict_trials([theta], (), [trial])[0]["temperature_K"]
 
 
 @pytest.mark.parametrize(
