@@ -81,8 +81,8 @@ def doubts(choice: Choice, split: Split, tested: float | None) -> list[str]:
 def perhaps_absent(names: Sequence[str]) -> list[str]:
     """Warnings for named effects whose interval contains the size at which they are absent."""
     return [
-        f"The interval of {name} contains the size at which it is absent: conditions disagree about its size, though"
-        " without it records that were not fitted are predicted worse."
+        f"The interval of {name} contains the size at which it is absent: its size is hardly known, though without it"
+        " records that were not fitted are predicted worse."
         for name in names
     ]
 
