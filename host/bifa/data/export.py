@@ -399,7 +399,7 @@ def _check_columns(fields: Fields, export: Export) -> None:
     for key in _TABLES:
         for name, value in getattr(export, key).items():
             if name not in _OWN:
-                raise fields.error(key, f"{name} is no column of a data set; the columns are {listed(sorted(_OWN), 8)}")
+                raise fields.error(key, f"{name} is not a column of a data set ({listed(sorted(_OWN), 8)})")
             _check_value(fields, export, key, name, value)
     for name in export.columns:
         if not is_command(name) and name not in export.units and name not in export.factor:
