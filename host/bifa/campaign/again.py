@@ -8,7 +8,7 @@ predicted narrows the uncertainty and so moves the edge; one that was not, or th
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
 from pathlib import Path
@@ -89,6 +89,12 @@ def read_rounds(file: Path) -> list[dict[str, Any]]:
     return rounds
 
 
+def fastest_at_edge(rounds: Sequence[Mapping[str, Any]]) -> int | None:
+    """Number of the round, from 1, whose gait at the edge is the fastest as measured; None if none was walked."""
+    at_edge = [number for number, one in enumerate(rounds, 1) if one["at_edge"]]
+    return max(at_edge, key=lambda number: rounds[number - 1]["measured_mm_s"], default=None)
+
+
 def ending(rounds: Sequence[Round]) -> Ending | None:
     """Return why the rounds end with the last of these; None if they go on."""
     if rounds[-1].is_predicted and rounds[-1].at_edge:
@@ -158,8 +164,9 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, steps: RoundSteps) -> N
     reached.
 
     `dataset`: all data behind model-completed.toml; the walks in `inputs` are added, and those of the completed model's
-    gait are the first round. Writes rounds.json, the walks of further rounds (rounds/walks-2, ...), the last round's
-    model and the fastest gait. Rounds that an interrupted run has already walked are not walked again.
+    gait are the first round. Writes rounds.json, the walks of further rounds (rounds/walks-2, ...) and the models that
+    sought their gaits (rounds/model-2.toml, ...), the last round's model and the fastest gait. Rounds that an
+    interrupted run has already walked are not walked again.
     """
     model, found = load_model(inputs / "model-completed.toml"), [load_gait(inputs / "gait-completed.toml")]
     walks = read_dataset(inputs / "walks-completed")
@@ -186,6 +193,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, steps: RoundSteps) -> N
         walks = read_dataset(folder) if folder.exists() else steps.walk(number, completed, gait, folder)
         found.append(gait)
         model = completed
+        save_model(outputs / "rounds" / f"model-{number}.toml", model)
         rounds.append(judged(model, walks, at_edge=True))
     rounds[-1] = replace(rounds[-1], ended=ended)
     save_model(outputs / "model-last.toml", model)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import bifa
-from bifa.campaign.again import read_rounds
+from bifa.campaign.again import fastest_at_edge, read_rounds
 from bifa.campaign.page import GAIT_NAMES, campaign_page, most_missed, motion_of
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import predict, prediction_of, speed_of, walks_of
@@ -38,7 +38,7 @@ def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stag
 
     robot: in words; made: how the campaign was made, for the report."""
     needs = ["bench", "model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "rounds.json"]
-    needs += ["gait-base.toml", "rounds", "model-last.toml"]
+    needs += ["gait-base.toml", "rounds"]
     needs += ["diagnosis.json", "errors.json", "residuals.json", *(["truth.json"] if sealed else [])]
     makes = ("summary.json", "walks.png", "errors.png", "walk.svg", "report.html")
     return Stage("compare", "compare and report", tuple(needs), makes, partial(_run, robot, made))
@@ -52,11 +52,11 @@ def _run(robot: str, made: Sequence[tuple[str, str]], inputs: Path, outputs: Pat
         "base": walks_of(load_gait(inputs / "gait-base.toml"), datasets["base"]),
         "completed": datasets["completed"].trials,
     }
-    results = [_result(name, trials, base, completed) for name, trials in walked.items()]
+    results = [_result(name, trials, base, _predicted(completed, trials[0])) for name, trials in walked.items()]
     rounds = read_rounds(inputs / "rounds.json")
-    if rounds[-1]["at_edge"]:
-        last = read_dataset(inputs / "rounds" / f"walks-{len(rounds)}")
-        results.append(_result("edge", last.trials, base, load_model(inputs / "model-last.toml")))
+    if number := fastest_at_edge(rounds):
+        fastest = read_dataset(inputs / "rounds" / f"walks-{number}")
+        results.append(_result("edge", fastest.trials, base, rounds[number - 1]))
     diagnosis, traces, errors = (
         json.loads((inputs / f"{name}.json").read_text()) for name in ("diagnosis", "residuals", "errors")
     )
@@ -88,24 +88,34 @@ def _run(robot: str, made: Sequence[tuple[str, str]], inputs: Path, outputs: Pat
     write_page(page, outputs / "report.html")
 
 
-def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -> dict[str, Any]:
+def _predicted(model: Model, trial: Trial) -> dict[str, Any]:
+    """Prediction of a trial's gait, as in a round."""
+    found = prediction_of(model, trial)
+    return {
+        "predicted_mm_s": found.speed_mm_s,
+        "interval_90_mm_s": found.interval_90_mm_s,
+        "walks_probability": found.walks_probability,
+    }
+
+
+def _result(gait: str, trials: Sequence[Trial], base: Model, predicted: Mapping[str, Any]) -> dict[str, Any]:
     """Speeds in mm/s over the settled cycles of a gait. spread: standard deviation of the repeats. settled_cycles:
-    number measured in all. interval_90_mm_s, walks_probability: predicted by the model `completed`, at the edge that of
-    the last round. stand_in: the baseline was walked because no gait walks on the model."""
+    number measured in all. completed_model, interval_90_mm_s, walks_probability: as `predicted` by the completed model,
+    at the edge by the model that sought the gait. stand_in: the baseline was walked because no gait walks on the model.
+    """
     measured, trial = [speed_of(one) for one in trials], trials[0]
     means = [speed.mean_mm_s for speed in measured]
-    prediction = prediction_of(completed, trial)
     return {
         "gait": gait,
         "base_model": prediction_of(base, trial).speed_mm_s,
-        "completed_model": prediction.speed_mm_s,
+        "completed_model": predicted["predicted_mm_s"],
         "measured": float(np.mean(means)),
         "spread": float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
         "paper": PAPER_MM_S[gait],
         "stand_in": gait != "baseline" and trial.gait == BASELINE.as_dict(),
         "settled_cycles": sum(speed.settled_cycles for speed in measured),
-        "interval_90_mm_s": prediction.interval_90_mm_s,
-        "walks_probability": prediction.walks_probability,
+        "interval_90_mm_s": predicted["interval_90_mm_s"],
+        "walks_probability": predicted["walks_probability"],
     }
 
 

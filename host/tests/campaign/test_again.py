@@ -9,7 +9,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from bifa.campaign.again import ROUNDS, Ending, RoundSteps, again, ending, judged, read_rounds
+from bifa.campaign.again import ROUNDS, Ending, RoundSteps, again, ending, fastest_at_edge, judged, read_rounds
 from bifa.campaign.loop import gait_at_edge
 from bifa.campaign.stages import StageError
 from bifa.campaign.walks import planned_cycles
@@ -159,6 +159,14 @@ def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
     assert seen == [["walks-1"], ["walks-1", "walks-2"]]
     assert all(abs(r["measured_mm_s"]) < 1.0 and not r["inside"] for r in rounds[1:])
     assert load_gait(folders[1] / "gait-last.toml") == FAST, "the robust gait is kept"
+    assert load_model(folders[1] / "rounds" / "model-3.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"])
+
+
+def test_of_the_gaits_at_the_edge_the_fastest_counts():
+    """Robot viscoelasticity, 923: after a walk that was 1 % slower than predicted, the next gait was a tenth slower."""
+    speeds = {20.9: False, 23.9: True, 21.7: True}
+    assert fastest_at_edge([{"at_edge": edge, "measured_mm_s": speed} for speed, edge in speeds.items()]) == 2
+    assert fastest_at_edge([{"at_edge": False, "measured_mm_s": 20.9}]) is None
 
 
 def test_a_gait_that_its_own_model_expects_to_fall_is_not_walked(folders):
