@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from bifa.lock import LockedError, locked
+from harness.full_disk import room_for
 
 HOLD = """
 import sys, time
@@ -53,14 +54,8 @@ def test_what_a_killed_program_has_left_is_stale(tmp_path):
 
 
 def test_a_full_disk_is_told_with_the_folder(tmp_path):
-    resource = pytest.importorskip("resource")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
-    try:
-        with pytest.raises(LockedError, match=r"/campaign cannot be written \(.*free some space"):
-            locked(tmp_path / "campaign").__enter__()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    with room_for(10), pytest.raises(LockedError, match=r"/campaign cannot be written \(.*free some space"):
+        locked(tmp_path / "campaign").__enter__()
     assert not list(tmp_path.iterdir())
 
 

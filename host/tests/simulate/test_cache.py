@@ -14,6 +14,7 @@ from bifa.errors import BifaError
 from bifa.files import TargetError
 from bifa.simulate import entries, generated
 from bifa.simulate.lanes import program
+from harness.full_disk import room_for
 
 _SECOND_START = """
 from bifa import robot, simulate
@@ -44,14 +45,8 @@ def test_a_changed_source_gets_another_file(tmp_path, monkeypatch):
 
 
 def test_a_full_disk_is_named(no_cache):
-    resource = pytest.importorskip("resource")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
-    try:
-        with pytest.raises(TargetError, match=r"bifa_sample_\w+\.py cannot be written"):
-            generated.load("sample", "value = 1" + 100 * " " + "\n")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    with room_for(100), pytest.raises(TargetError, match=r"bifa_sample_\w+\.py cannot be written"):
+        generated.load("sample", "value = 1" + 100 * " " + "\n")
     assert not list(no_cache.rglob("*.*"))
 
 
