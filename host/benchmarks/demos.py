@@ -19,13 +19,14 @@ from typing import NamedTuple
 
 from benchmarks import records as lines
 from benchmarks.blind_figures import wilson
+from bifa.campaign.again import fastest_at_edge
 
 SEEDS, FIRST_SEED, JOBS, OUT = 10, 1000, 2, Path("../out/demos")
 
 
 class Story(NamedTuple):
     """A demo: the sealed and the named effects; errors on held-out trials, in units of the noise; the speed walked with
-    a margin of 2 %; and for the campaign's last gait, at the edge of what is known, the speeds predicted and walked."""
+    a margin of 2 %; and for the gait handed over, at the edge of what is known, the speeds predicted and walked."""
 
     seed: int
     truth: tuple[str, ...]
@@ -56,7 +57,8 @@ def told(seed: int, out: Path) -> Story:
 
 def story(seed: int, summary: dict) -> Story:
     """Extract a story from a demo's `summary.json`."""
-    robust, edge = summary["rounds"][0], summary["rounds"][-1]
+    rounds = summary["rounds"]
+    robust, edge = rounds[0], rounds[(fastest_at_edge(rounds) or 1) - 1]
     error = {name: summary["error"][name]["held_out"] for name in ("before", "after", "noise_floor")}
     return Story(
         seed,

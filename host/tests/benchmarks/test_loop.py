@@ -1,5 +1,6 @@
 """The benefit of the closed loop: table, coverage and records of the benchmark."""
 
+from dataclasses import replace
 from unittest.mock import Mock
 
 import pytest
@@ -54,6 +55,15 @@ def test_means_over_robots(capsys):
     assert figures["loop_edge_holds_90"] == 1.0
     assert figures["loop_edge_worst_behind_base"] == pytest.approx(0.0)
     assert "robots: 2" in capsys.readouterr().out
+
+
+def test_coverage_over_first_gaits_is_shown_beside_that_of_the_gaits_handed_over(capsys):
+    gains = [replace(robot(), edge_inside=inside) for inside in ((True,), (False, True), ())]
+    figures = loop.summed_up(gains)
+    assert figures["loop_first_edge_holds_90"] == pytest.approx(1 / 2)
+    assert figures["loop_every_edge_holds_90"] == pytest.approx(2 / 3)
+    assert "1 of 2 first gaits at the edge, 2 of 3" in capsys.readouterr().out
+    assert "loop_first_edge_holds_90" not in loop.summed_up([robot()])  # of a record that lacks it
 
 
 def test_reliability_compares_what_was_predicted_with_what_walked_and_is_drawn(tmp_path):
