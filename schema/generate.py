@@ -42,7 +42,7 @@ def generated() -> dict[Path, str]:
         ROOT / "host/bifa/version.py": py_version.module(commands),
         ROOT / "host/lacuna/version.py": py_version.module(commands),
         ROOT / "host/virtual_robot/version.py": py_version.module(commands, py_version.GPL),
-        ROOT / "host/bifa/ranges.py": py_ranges.module(parameters, commands),
+        ROOT / "host/bifa/ranges.py": py_ranges.module(parameters, commands, constants()),
         ROOT / "host/bifa/link/table.py": py_tables.module(parameters, commands, constants(), agreed),
     }
 

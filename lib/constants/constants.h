@@ -6,6 +6,7 @@
 
 namespace bifa {
 
+const uint16_t kTick_us = 1000;  ///< interval at which the oscillators step and valves switch
 const uint8_t kDeadTime_ms = 3;  ///< time for which both valves of a chamber stay off when it switches from one to the other: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms
 const uint8_t kSamplePeriod_ms = 10;  ///< interval between pressure samples and their strobes
 const uint8_t kMarkPause = 10;  ///< number of strobes left out as a mark

@@ -1,12 +1,12 @@
 #include "gait.h"
 
+#include "constants.h"
 #include "sine.h"
 
 namespace bifa {
 
 namespace {
 
-const uint32_t kStep_us = 1000;
 const uint32_t kFullTurn_mdeg = 360000;
 const uint16_t kFullDuty_e4 = 10000;
 
@@ -39,7 +39,7 @@ uint32_t turns(uint32_t angle_mdeg) { return divide(angle_mdeg % kFullTurn_mdeg,
 
 Gait gait_of(const ParameterSet& set) {
   Gait gait;
-  const Fraction increment = divide(kStep_us, set.period_us);
+  const Fraction increment = divide(kTick_us, set.period_us);
   gait.increment = increment.whole;
   gait.increment_fraction = increment.rest;
   uint32_t gain = set.coupling_milli_per_s * kGainScale;  // below 2^32 up to 23.9 / s

@@ -16,11 +16,11 @@ from bifa.link import Uno
 from bifa.measure.experiments import Progress
 from bifa.measure.plan import Turn, walks
 from bifa.measure.session import Recorder, run_session, unattended
-from bifa.problem.switches import seconds_per_uno_s, valves_of
+from bifa.problem.switches import seconds_per_uno_s, valves_of, walk_timeline
 from bifa.rig import Rig
 from bifa.robot import Model
 from bifa.robot.gait import Gait, GaitFile
-from bifa.simulate import of_gait, walk
+from bifa.simulate import walk
 
 
 def measure_walks(
@@ -91,8 +91,7 @@ def prediction_of(model: Model, trial: Trial, naive: bool = False) -> Prediction
 
 
 def predict(model: Model, trial: Trial) -> dict[str, Any]:
-    """Simulate the walk in `trial` with the model: the same columns, on the trial's clock."""
-    gait = Gait(**trial.walked)
-    commands = valves_of(of_gait(gait, trial.time_s[-1] + gait.period_s), trial)
-    columns = walk(model, commands=commands, time_s=trial.time_s * seconds_per_uno_s(trial)).columns
+    """Simulate the walk in `trial`, with its switching of the valves: the same columns, on the trial's clock."""
+    commands = valves_of(walk_timeline(trial), trial)
+    columns = walk(model, commands=commands, time_s=trial.elapsed_s * seconds_per_uno_s(trial)).columns
     return dict(columns) | {"time_s": trial.time_s}

@@ -48,7 +48,8 @@ class Metric:
     `periodic` (relative to the advance, or to 1 mm if that is more) and slip at most `slip_m` each. Slip is travel
     while both ends slide. tolerance_m: of the integrator, per step. direction: -1 to count backward walking.
     inclination_deg: of the pipe, uphill positive. clock: seconds per second of the Uno, to which gaits and speeds
-    refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies. unlike: every cycle
+    refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies; tick_s: on
+    the same clock, of the Uno, 0 if valves switch at any time. unlike: every cycle
     differs from the one before, so that no walk settles. settled: relative difference between the advances of three
     successive cycles at which a walk counts as settled, and the other cycles are not simulated: of ten it takes five or
     six. 0 to simulate all. looser: factor on the tolerance of the small actuators' states. single: in single precision.
@@ -63,6 +64,7 @@ class Metric:
     inclination_deg: float = 0.0
     clock: float = 1.0
     dead_time_s: float = 0.0
+    tick_s: float = 0.0
     unlike: bool = False
     settled: float = _SETTLED
     looser: float = _LOOSER
@@ -120,6 +122,7 @@ class Passage:
     inclination_deg: float = 0.0
     clock: float = 1.0
     dead_time_s: float = 0.0
+    tick_s: float = 0.0
     looser: float = _LOOSER
     single: bool = True
     settled = 0.0  # not a field: no walk ends early

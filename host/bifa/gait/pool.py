@@ -30,6 +30,7 @@ class Simulations:
             inclination_deg=metric.inclination_deg,
             terrain=metric.terrain,
             dead_time_s=metric.dead_time_s * metric.clock,
+            tick_s=metric.tick_s * metric.clock,
             settled=metric.settled,
             looser=metric.looser,
             single=metric.single,

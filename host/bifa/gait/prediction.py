@@ -103,11 +103,12 @@ class Predictor:
         clock_rate: seconds per second of the Uno, default as known; speeds are on the Uno's clock.
         """
         draws, rate = len(self._robots) - 1, self._timing.clock if clock_rate is None else clock_rate
-        own = gait_rows([gait])
-        rows = np.vstack([self._with_switch_errors(np.repeat(own, draws, axis=0)), own])
+        rows = np.repeat(gait_rows([gait]), len(self._robots), axis=0)
         rows[:, 0] *= rate
-        vented_s = rate * self._timing.dead_time_s
-        progress = speeds(self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, single=True, workers=workers)
+        vented_s, tick_s = rate * self._timing.dead_time_s, rate * self._timing.tick_s
+        progress = speeds(
+            self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, tick_s=tick_s, single=True, workers=workers
+        )
         advance_mm = 1e3 * progress.advance_m
         found = [settling(one) for one in advance_mm]
         begins = [f.begins for f in found[:draws] if f.is_settled]
@@ -123,16 +124,6 @@ class Predictor:
         errors = (-seen_mm_s if backward else seen_mm_s) - drawn
         errors += drawn * self._noise_share * random.standard_normal(draws)
         return Prediction(drawn, settled + MIN_CYCLES, backward, errors, own_mm_s)
-
-    def _with_switch_errors(self, rows: np.ndarray) -> np.ndarray:
-        """The gaits (n, 6) with valves that switch slightly early or late in each walk: at a cliff half a millisecond
-        decides."""
-        most_s = self._timing.switch_error_s
-        late_s = np.random.default_rng([self._seed, 6]).uniform(-most_s, most_s, (len(rows), 3, 2))
-        to_vacuum, to_positive = np.moveaxis(late_s, 2, 0) / rows[:, :1]  # body, head, tail, as fractions of the period
-        rows[:, 1:3] -= 360.0 * (to_vacuum[:, 1:] - to_vacuum[:, :1])
-        rows[:, 3:] = np.clip(rows[:, 3:] + to_positive - to_vacuum, 0.0, 1.0)
-        return rows
 
 
 def predict_speed(

@@ -55,7 +55,7 @@ def switch_timing(system: RobotSystem) -> Scatter:
     clock = float(np.mean([seconds_per_uno_s(trial) for trial in walks]))
     noted = {
         name: round(float(np.mean([trial.extra.get(name, 0.0) for trial in walks])), 6)
-        for name in ("dead_time_s", "switch_error_s")
+        for name in ("dead_time_s", "tick_s")
     }
     return Scatter(clock=round(clock, 6), **noted)
 

@@ -31,6 +31,7 @@ TABLE_HASH = 0x6908B694
 NAME_BYTES = 12
 
 # the firmware's own numbers
+TICK_US = 1000  # interval at which the oscillators step and valves switch
 DEAD_TIME_MS = 3  # time for which both valves of a chamber stay off when it switches from one to the other: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms
 SAMPLE_PERIOD_MS = 10  # interval between pressure samples and their strobes
 MARK_PAUSE = 10  # number of strobes left out as a mark

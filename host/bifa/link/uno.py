@@ -22,13 +22,13 @@ from bifa.link.table import (
 )
 from bifa.link.transport import Clock, Transport
 from bifa.link.units import UnoParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
-from bifa.ranges import CHAMBERS
+from bifa.ranges import CHAMBERS, TICK_S
 
 EEPROM_TIMEOUT_S = 10.0
 CLOCK_EVERY_S = 1.0
-CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds, so the true time may be later by this
 EXCHANGES_AT_START = 5
 PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means around this time after its strobe (docs/firmware.md)
+PRESSURES_OVER_S = 2.5e-3  # the means' duration
 SAMPLE_US = 1000 * SAMPLE_PERIOD_MS
 DEAD_TIME_S = 1e-3 * (DEAD_TIME_MS + 1)  # venting between the two supplies, including the wait for the tick
 CONNECTIONS = ("off", "positive", "vacuum", "both")  # indexed by the bits of a chamber's two valves
@@ -176,7 +176,8 @@ class Uno:
         """Add one measurement to `clock_relation`."""
         [answer] = self.session.call_all([("read_clock", ())])
         uno_s = self._unwrap_time(answer.report["time_us"]) / 1e6
-        self.clock_relation.add(answer.sent_s - CLOCK_TICK_S, uno_s, answer.received_s)
+        # the Uno reads its clock in whole ticks, so the true time may be later by one
+        self.clock_relation.add(answer.sent_s - TICK_S, uno_s, answer.received_s)
         self._next_exchange_s = self._clock.now() + self._exchange_every_s
 
     def keep_alive(self) -> None:

@@ -9,13 +9,13 @@ from bifa.data import Trial
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.units import set_point_psi
-from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
+from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S, PRESSURES_OVER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, camera_rate, resampled
 from bifa.measure.plan import EXTENDED, PULL_MM, SNAP_PSI, PlannedTrial
 from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Bench, Recording, idle, mount
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.printable import counted
-from bifa.ranges import CHAMBERS
+from bifa.ranges import CHAMBERS, TICK_S
 
 CHAMBER_OF = {"large": "body", "small": "head"}
 SETTLE_S = 6.0  # for a pressure to settle: over three of the slowest time constants, 1.7 s (1 / body_alpha_s_per_s)
@@ -28,7 +28,6 @@ STILL_S = 1.0  # kept before and after the motion
 ATTEMPTS = 3  # at recording a trial without lost telemetry and with clocks that can be aligned
 
 SAMPLE_S = 0.01
-TICK_S = 1e-3  # the Uno switches valves at its ticks
 
 Progress = Callable[[float], None]
 Recorded = tuple[dict[str, np.ndarray], dict[str, Any], int]  # columns, notes (`extra`), lost samples
@@ -144,7 +143,7 @@ def _walk(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
         doing = f"The robot walks {counted(cycles, 'cycle')} of {period_s:g} s"
         tape.wait(cycles * period_s + LEAD_S, doing=doing)
     known = {
-        "switch_error_s": TICK_S / 2,
+        "tick_s": TICK_S,
         "command_age_s": PRESSURES_AFTER_S,
         "gait_ahead_s": TICK_S,  # the first switches are decided by the phases after the first step
     } | set_point(uploaded["pressure_psi"])
@@ -161,8 +160,10 @@ RUNS: dict[str, Callable[[Bench, Uno, PlannedTrial, Progress], Recorded]] = {
 
 
 def noted(clock: ClockLine) -> dict[str, Any]:
-    """Return what every trial notes: the quality of the clocks' alignment, and the Uno's dead time between supplies."""
-    return {"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate, "dead_time_s": DEAD_TIME_S}
+    """Return what every trial notes: the quality of the clocks' alignment, and the Uno's dead time between supplies and
+    the duration over which it averages pressures."""
+    clocks = {"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate}
+    return clocks | {"dead_time_s": DEAD_TIME_S, "averaged_s": PRESSURES_OVER_S}
 
 
 def set_point(commanded_psi: float) -> dict[str, float]:
@@ -245,9 +246,9 @@ def _walk_columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np
         raise BifaError("the Uno sent no sample while it ran: check the link's counters with `bifa monitor`")
     refuse_disturbed(tape.samples[np.argmax(runs) :], "running")
     # The body's phase grows evenly from 0. At a strobe it is still the phase by which the tick before switched the
-    # valves, so the time at which it extrapolates to 0 is that of the first switching.
+    # valves, so the time at which it extrapolates to 0 is that of the first switching, a whole number of ticks ago.
     first = running[0]
-    begun_s = tape.uno_s[first] - tape.samples[first].phase_rad[0] / (2 * np.pi) * period_s
+    begun_s = tape.uno_s[first] - TICK_S * round(tape.samples[first].phase_rad[0] / (2 * np.pi) * period_s / TICK_S)
     since_s = tape.uno_s[running] - begun_s
     if since_s[-1] < cycles * period_s - SAMPLE_S:
         raise DisturbedError(f"the robot walked {since_s[-1]:.2f} s instead of {cycles * period_s:g}: repeat")

@@ -46,6 +46,29 @@ class RobotInTrial(Generic[Given]):
 
 
 @dataclass(frozen=True)
+class Averaging:
+    """Simulation of samples that are means over `averaged_s`: during an impact pressures change within a millisecond.
+    Two points, Gauss's, suffice."""
+
+    time_s: np.ndarray
+    averaged_s: float
+
+    @property
+    def simulated_s(self) -> np.ndarray:
+        """Times to simulate, in order."""
+        if self.averaged_s == 0.0:
+            return self.time_s
+        away_s = self.averaged_s / np.sqrt(12.0)
+        return np.fmax(np.column_stack([self.time_s - away_s, self.time_s + away_s]), 0.0).ravel()
+
+    def means(self, columns: Columns) -> Columns:
+        """The samples, from columns at the simulated times."""
+        if self.averaged_s == 0.0:
+            return columns
+        return {name: column.reshape(-1, 2).mean(axis=1) for name, column in columns.items()}
+
+
+@dataclass(frozen=True)
 class StaticInputs:
     """Inputs of a static loading. `turned_m`: displacements at which the motion reversed between samples, each just
     before the sample with the index in `turned_before`. Effects that depend on travel need these turning points."""
@@ -99,6 +122,7 @@ class StepInputs:
     commands: Timeline
     pressure_psi: float
     switch_sd_s: float = 0.0
+    averaged_s: float = 0.0
     channels: tuple[str, ...] = ("displacement_mm", "pressure_psi")
     positive_psi: None = None
 
@@ -108,18 +132,20 @@ class StepInputs:
 
     @staticmethod
     def simulate(cases: Sequence[RobotInTrial[StepInputs]], tolerance_m: float, together: bool) -> list[Columns]:
+        samples = [Averaging(case.inputs.time_s, case.inputs.averaged_s) for case in cases]
         records = simulate.step_responses(
             [case.plant for case in cases],
             cases[0].inputs.actuator,
-            [case.inputs.time_s for case in cases],
+            [sample.simulated_s for sample in samples],
             [case.commands for case in cases],
             [case.inputs.pressure_psi for case in cases],
             tolerance_m,
             together,
         )
+        found = [sample.means(record.columns) for sample, record in zip(samples, records, strict=True)]
         return [
-            {**record.columns, "displacement_mm": record["displacement_mm"] + case.zero_m * _MM}
-            for record, case in zip(records, cases, strict=True)
+            {**columns, "displacement_mm": columns["displacement_mm"] + case.zero_m * _MM}
+            for columns, case in zip(found, cases, strict=True)
         ]
 
 
@@ -192,6 +218,7 @@ class WalkInputs:
     positive_psi: float | None
     channels: tuple[str, ...]
     switch_sd_s: float = 0.0
+    averaged_s: float = 0.0
     actuator: None = None
 
     @property
@@ -200,16 +227,17 @@ class WalkInputs:
 
     @staticmethod
     def simulate(cases: Sequence[RobotInTrial[WalkInputs]], tolerance_m: float, together: bool) -> list[Columns]:
+        samples = [Averaging(case.inputs.time_s, case.inputs.averaged_s) for case in cases]
         records = simulate.walks(
             [case.plant for case in cases],
             [case.commands for case in cases],
-            [case.inputs.time_s for case in cases],
+            [sample.simulated_s for sample in samples],
             inclinations_deg=[case.inputs.inclination_deg for case in cases],
             tolerance_m=tolerance_m,
             together=together,
             states=False,
         )
-        return [record.columns for record in records]
+        return [sample.means(record.columns) for sample, record in zip(samples, records, strict=True)]
 
 
 # Inputs of a trial. `channels`: names of the predicted channels. `actuator`: "large" or "small"; None if the trial does
@@ -228,6 +256,10 @@ def _pressure_psi(trial: Trial) -> float:
     """The regulator's set-point if recorded (its converter has steps of 0.03 psi), else the commanded pressure."""
     noted = trial.extra.get("set_point_psi")
     return trial.commanded_psi if noted is None else noted
+
+
+def _averaged_s(trial: Trial) -> float:
+    return trial.extra.get("averaged_s", 0.0) * seconds_per_uno_s(trial)
 
 
 def _time_s(trial: Trial) -> np.ndarray:
@@ -249,7 +281,9 @@ def _static(trial: Trial) -> StaticInputs:
 
 def _step(trial: Trial) -> StepInputs:
     commands = valves_of(step_timeline(trial), trial)
-    return StepInputs(trial.tested, _time_s(trial), commands, _pressure_psi(trial), switch_sd_s(trial))
+    return StepInputs(
+        trial.tested, _time_s(trial), commands, _pressure_psi(trial), switch_sd_s(trial), _averaged_s(trial)
+    )
 
 
 def _pull(trial: Trial) -> PullInputs:
@@ -277,6 +311,7 @@ def _walk(trial: Trial) -> WalkInputs:
         positive_psi=at_its_own,
         channels=(*displacements, *pressures),
         switch_sd_s=switch_sd_s(trial),
+        averaged_s=_averaged_s(trial),
     )
 
 

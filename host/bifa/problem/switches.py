@@ -89,8 +89,8 @@ def walk_timeline(trial: Trial) -> Timeline:
     if trial.gait is None:
         return recorded
     gait = Gait(**{name: trial.gait[name] for name in Gait.__dataclass_fields__})
-    ahead_s, error_s = (trial.extra.get(name, 0.0) for name in ("gait_ahead_s", "switch_error_s"))
-    settled = _settled(gait, recorded, time_s, ahead_s, error_s)
+    ahead_s, tick_s, error_s = (trial.extra.get(name, 0.0) for name in ("gait_ahead_s", "tick_s", "switch_error_s"))
+    settled = _settled(gait, recorded, time_s, ahead_s, tick_s, error_s)
     return settled or refine(recorded, gait, float(np.median(np.diff(time_s))))
 
 
@@ -105,11 +105,14 @@ def _with_times(recorded: Timeline, noted: dict[str, Sequence[float]]) -> Timeli
     return timeline(zip(time_s, recorded.chamber, recorded.command, strict=True))
 
 
-def _settled(gait: Gait, recorded: Timeline, time_s: np.ndarray, ahead_s: float, error_s: float) -> Timeline | None:
-    """The switches of a settled gait that has run for `ahead_s` at time 0, shifted as a whole by the least amount that
-    agrees with the record if each may be off by `error_s`. None if they disagree by more than a sample."""
+def _settled(
+    gait: Gait, recorded: Timeline, time_s: np.ndarray, ahead_s: float, tick_s: float, error_s: float
+) -> Timeline | None:
+    """The switches of a settled gait that has run for `ahead_s` at time 0, at the ticks of the Uno, shifted as a whole
+    by the least amount that agrees with the record if each may be off by `error_s`. None if they disagree by more than
+    a sample."""
     sample_s = float(np.median(np.diff(time_s)))
-    ideal = of_gait(gait, float(time_s[-1]) + sample_s, 2.0 * np.pi * ahead_s / gait.period_s)
+    ideal = of_gait(gait, float(time_s[-1]) + sample_s, 2.0 * np.pi * ahead_s / gait.period_s, tick_s)
     low, high = -np.inf, np.inf
     for chamber in range(3):
         seen = recorded.time_s[recorded.chamber == chamber][1:]

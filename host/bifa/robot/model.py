@@ -47,7 +47,7 @@ class Scatter:
 
     The Uno's timekeeping is not scatter, but affects at which gaits a robot stops walking. clock: true seconds per
     second of the Uno; dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies;
-    switch_error_s: greatest error of a valve's switching time, due to the Uno's ticks.
+    tick_s: on the same clock, the Uno's tick, at which valves switch; 0 if unknown.
     """
 
     friction: float = 0.0
@@ -56,12 +56,12 @@ class Scatter:
     speed: float = 0.0
     clock: float = 1.0
     dead_time_s: float = 0.0
-    switch_error_s: float = 0.0
+    tick_s: float = 0.0
 
     @property
     def timing(self) -> Scatter:
         """A copy with only the Uno's timekeeping."""
-        return Scatter(clock=self.clock, dead_time_s=self.dead_time_s, switch_error_s=self.switch_error_s)
+        return Scatter(clock=self.clock, dead_time_s=self.dead_time_s, tick_s=self.tick_s)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -69,7 +69,7 @@ class Scatter:
                 raise ModelParameterError(f"scatter.{name} = {value:g} must be a finite number, at least 0")
         if not 0.9 <= self.clock <= 1.1:
             raise ModelParameterError(f"scatter.clock = {self.clock:g} must be within 0.9 to 1.1")
-        for name in ("dead_time_s", "switch_error_s"):
+        for name in ("dead_time_s", "tick_s"):
             if getattr(self, name) > MOST_LATE_S:
                 raise ModelParameterError(f"scatter.{name} = {getattr(self, name):g} must be at most {MOST_LATE_S}")
 
@@ -147,6 +147,12 @@ class Model:
             else:
                 raise ModelParameterError(f"{name!r} is not a parameter; known are {', '.join(BASE_PARAMETERS)}")
         return replace(self, parameters=parameters, effects=effects)
+
+    @property
+    def base(self) -> Model:
+        """The base model alone, with the values fitted along with the effects: an initial guess for a fit to more
+        data."""
+        return replace(self, effects={}, learnt={}, covariance=None, scatter=None)
 
     def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Model:
         """A copy with exactly these effects active. Omitted parameters take their default values; the covariance is

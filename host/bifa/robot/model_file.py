@@ -146,6 +146,7 @@ def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
 
 
 def _read_scatter(entry: dict[str, Any]) -> Scatter:
+    entry = {name: value for name, value in entry.items() if name != "switch_error_s"}  # of earlier versions
     _only(entry, "scatter", set(), {field.name for field in fields(Scatter)})
     for name, value in entry.items():
         check_range(ModelFileError, f"scatter.{name}", value, 0.0, _MOST_SCATTER)

@@ -48,6 +48,7 @@ def speeds(
     inclination_deg: float = 0.0,
     terrain: np.ndarray = rigs.CLEAR,
     dead_time_s: float = 0.0,
+    tick_s: float = 0.0,
     settled: float = 0.0,
     looser: float = 1.0,
     single: bool = False,
@@ -55,10 +56,11 @@ def speeds(
     executor: Executor | None = None,
 ) -> Advance:
     """Simulate gaits (n, 6), all with one model or each with its own of n models; arrays have shape (n, cycles).
-    `dead_time_s`: how long the Uno vents a chamber when switching between supplies. `settled`: if not 0, a walk ends
-    once the advance of a cycle and those of the two before agree to within this share, and the other cycles repeat it.
-    `looser`: by this factor the small actuators' states may err more than where their pressures are read. `single`: in
-    single precision, which rounds less than the integrator errs at tolerances down to 1 um.
+    `dead_time_s`, `tick_s`: how long the Uno vents a chamber when switching between supplies, and the ticks at which it
+    does (`gait_switches`). `settled`: if not 0, a walk ends once the advance of a cycle and those of the two before
+    agree to within this share, and the other cycles repeat it. `looser`: by this factor the small actuators' states may
+    err more than where their pressures are read. `single`: in single precision, which rounds less than the integrator
+    errs at tolerances down to 1 um.
 
     Runs on `executor`, or else in `workers` threads (by default one per core) without the GIL. Rows are dealt out in
     turn, since gaits differ in cost and neighbors are alike. Angles need not be within 0-360.
@@ -74,7 +76,8 @@ def speeds(
     shares = [slice(first, None, pieces) for first in range(min(pieces, n))]
     if executor is None and len(shares) > 1:
         executor = _pool(count)
-    run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s, settled, looser, single)
+    where = inclination_deg, terrain
+    run = partial(_progress, cycles, tolerance_m, *where, dead_time_s, tick_s, settled, looser, single)
     each: Callable[..., Any] = executor.map if executor else map
     found = each(run, [flats[share] for share in shares], [gaits[share] for share in shares])
     advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
@@ -89,6 +92,7 @@ def _progress(
     inclination_deg: float,
     terrain: np.ndarray,
     dead_time_s: float,
+    tick_s: float,
     settled: float,
     looser: float,
     single: bool,
@@ -100,7 +104,7 @@ def _progress(
     mounted = {key: rigs.pipe(flat, inclination_deg, terrain, looser=looser) for key, flat in robots.items()}
     ways = [mounted[id(flat)] for flat in flats]
     ends = gaits[:, :1] * np.arange(1, cycles + 1)
-    switches = gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)
+    switches = gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s, tick_s=tick_s)
     what = lanes.Experiment(lanes.PROGRESS, ways, switches, list(ends), tolerance_m, settled=settled, single=single)
     rows = np.array(lanes.march(flats, what, together=False))
     starts = np.array([flat.q[layout.BODY + layout.CONTRACTED] for flat in flats])

@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from bifa.errors import BifaError
-from bifa.ranges import CHAMBERS
+from bifa.ranges import CHAMBERS, DECIMALS, TICK_S
 from bifa.robot import cpg
-from bifa.robot.gait import Gait, gait_rows
+from bifa.robot.gait import GAIT_NAMES, Gait, gait_rows
 from bifa.simulate.compiled import kernel
 from bifa.simulate.hooks import chains
 from bifa.simulate.stepper import OFF, POSITIVE, VACUUM
 
 _TWO_PI = 2.0 * math.pi
+_PER_UNIT = np.array([10.0 ** DECIMALS[name] for name in GAIT_NAMES])  # the Uno's units in a gait's
+_SPARE_TICKS = 1e-6  # the Uno's phases are rounded down, so that one that would be just in time is late
 
 
 class TimelineError(BifaError):
@@ -78,10 +80,11 @@ def timeline(switches: Iterable[Sequence[float]]) -> Timeline:
     return Timeline(rows[:, 0], chamber, command)
 
 
-def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0) -> Timeline:
+def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0, tick_s: float = 0.0) -> Timeline:
     """Switches of a settled gait: the phases differ by constant psi from time 0, where the body is at
-    `first_phase_rad`."""
-    return gait_switches(gait_rows([gait]), np.array([duration_s], dtype=float), float(first_phase_rad))[0]
+    `first_phase_rad`. `tick_s`: see `gait_switches`."""
+    rows, duration = gait_rows([gait]), np.array([duration_s], dtype=float)
+    return gait_switches(rows, duration, float(first_phase_rad), tick_s=tick_s)[0]
 
 
 def of_samples(time_s: np.ndarray, columns: np.ndarray) -> Timeline:
@@ -140,18 +143,34 @@ def recorded_commands(columns: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def gait_switches(
-    gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: float = 0.0, dead_time_s: float = 0.0
+    gaits: np.ndarray,
+    duration_s: np.ndarray,
+    first_phase_rad: float = 0.0,
+    dead_time_s: float = 0.0,
+    tick_s: float = 0.0,
 ) -> list[Timeline]:
     """Timelines of settled gaits, given as rows (period, psi12, psi13 in degrees, three duties), each for its duration
-    in `duration_s`. Chambers are vented between the supplies as in `vented_between`."""
+    in `duration_s`. Chambers are vented between the supplies as in `vented_between`.
+
+    tick_s: duration of the Uno's tick, 1 ms by its own clock, counted from time 0. It walks a gait in whole units of
+    its parameters, and its valves switch at ticks, as decided by the phases half a tick later (lib/cpg/oscillators.h).
+    0 for the gait as it is, with switches at any time.
+    """
+    ahead = np.zeros((1, 1))
+    if tick_s > 0.0:
+        per_unit = _PER_UNIT * np.array([TICK_S / tick_s, 1.0, 1.0, 1.0, 1.0, 1.0])  # periods are in other seconds
+        gaits = np.floor(gaits * per_unit + 0.5) / per_unit
+        ahead = 0.5 * tick_s / gaits[:, :1]
     period, duty = gaits[:, :1], gaits[:, 3:]
-    phase = first_phase_rad / _TWO_PI + np.pad(gaits[:, 1:3], ((0, 0), (1, 0))) / 360.0
+    phase = first_phase_rad / _TWO_PI + ahead + np.pad(gaits[:, 1:3], ((0, 0), (1, 0))) / 360.0
     phase = phase - np.floor(phase)
     always, never = duty <= 0.0, duty >= 1.0
     first = np.where(always | never, always, phase >= duty)  # (n, 3): positive at time 0, after any switch at 0
     cycles = int(np.max(duration_s / gaits[:, 0])) + 3
     edge = np.stack([np.zeros_like(duty), duty], axis=-1)[:, :, None, :]
     time = (np.arange(cycles)[None, None, :, None] + edge - phase[:, :, None, None]) * period[:, :, None, None]
+    if tick_s > 0.0:
+        time = tick_s * np.ceil(time / tick_s + _SPARE_TICKS)
     real = (time > 0.0) & (time < duration_s[:, None, None, None]) & ~(always | never)[:, :, None, None]
     n, counts = len(gaits), np.count_nonzero(real, axis=(1, 2, 3))
     time_s = np.where(real, time, np.inf).reshape(n, -1)

@@ -129,18 +129,19 @@ def test_what_is_predicted_is_what_the_uno_does_which_vents_between_the_supplies
     assert other < 2.0
 
 
-def test_at_a_cliff_the_ticks_of_the_uno_decide_which_nobody_foresees():
+def test_at_a_cliff_the_ticks_of_the_uno_decide():
     """Robot friction_direction, 500: no run of four walked with the period off by 0.30 %, six of six did at 0.33 %."""
     edge = library.load("fast").gait
-    certain, open_ = (known(Scatter(switch_error_s=s)) for s in (0.0, 0.0005))
-    assert predict_speed(certain, spread_of(certain), edge, draws=64).walks_probability > 0.98
-    assert 0.3 < predict_speed(open_, spread_of(open_), edge, draws=64).walks_probability < 0.9
-    baseline = [predict_speed(m, spread_of(m), BASELINE, draws=64).interval_90_mm_s for m in (certain, open_)]
+    faster = [replace(edge, period_s=(1.0 - 1e-4 * k) * edge.period_s) for k in (5, 6, 7)]
+    ticking, steady = (known(Scatter(tick_s=s)) for s in (0.001, 0.0))
+    walk = [[predict_speed(m, spread_of(m), g, draws=8).speed_mm_s > 20.0 for g in faster] for m in (ticking, steady)]
+    assert walk == [[True, False, True], [False, False, False]]
+    baseline = [predict_speed(m, spread_of(m), BASELINE, draws=64).interval_90_mm_s for m in (ticking, steady)]
     assert baseline[1] == pytest.approx(baseline[0], abs=0.01), "elsewhere they do not"
 
 
 def test_how_the_uno_keeps_time_is_known_whatever_the_spread():
-    timing = Scatter(dead_time_s=0.004, clock=0.998, switch_error_s=0.0005)
+    timing = Scatter(dead_time_s=0.004, clock=0.998, tick_s=0.001)
     model = known(replace(timing, friction=0.01))
     assert spread_of(model, 0.02).scatter == spread_of(model).naive.scatter == timing
 

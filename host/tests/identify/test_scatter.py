@@ -24,10 +24,10 @@ def test_noise_averages_out_of_what_repeats_share():
 
 def test_the_scatter_says_how_the_uno_keeps_time():
     first = Trial("walk.csv", "locomotion", columns={}, gait=BASELINE.as_dict(), extra={"clock_rate": 1.002})
-    noted = {"clock_rate": 1.004, "dead_time_s": 0.004, "switch_error_s": 0.0005}
+    noted = {"clock_rate": 1.004, "dead_time_s": 0.004, "tick_s": 0.001}
     trials = (first, replace(first, repeat=2, extra=noted))
     timing = switch_timing(SimpleNamespace(dataset=Dataset(None, "day", {}, trials)))
-    assert timing == Scatter(clock=0.99701, dead_time_s=0.002, switch_error_s=0.00025)
+    assert timing == Scatter(clock=0.99701, dead_time_s=0.002, tick_s=0.0005)
 
 
 def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():

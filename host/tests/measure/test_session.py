@@ -91,10 +91,18 @@ def test_a_stand_that_cannot_pull_backward_is_not_taken_to_have_done_so(rig, uno
 
 
 @pytest.mark.uno
-def test_valves_switch_when_the_record_of_a_walk_has_them_switch(rig, uno):
-    """Modelled switching times match the pin edges of the simulated chip. The Uno switches at whole ticks, so single
-    edges are off by up to half a tick, but their mean is not."""
-    planned = PlannedTrial("locomotion", gait=Gait(3.1234, 263.3, 97.7, 0.47, 0.53, 0.61), cycles=4)
+@pytest.mark.parametrize(
+    "gait",
+    [
+        Gait(3.1234, 263.3, 97.7, 0.47, 0.53, 0.61),
+        Gait(2.6367070443755143, 204.76405963711377, 331.5678603093841, 0.6881557404918061, 0.445011, 0.445011),
+        Gait(2.3217, 200.1, 330.05, 0.7, 0.44445, 0.4001),
+        Gait(4.401, 180.0, 90.0, 0.5, 0.5, 0.25),  # phases that pass a threshold exactly between two ticks
+    ],
+)
+def test_valves_switch_when_the_record_of_a_walk_has_them_switch(rig, uno, gait):
+    """Modelled switching times match the pin edges of the simulated chip, each at the very tick."""
+    planned = PlannedTrial("locomotion", gait=gait, cycles=4)
     trial = record_trial(bench_of(rig), uno, planned)
     pins = [event for event in rig.uno.iter_events() if event.kind == "pin"]
     edges_s = np.array([event.cycle / CLOCK_HZ for event in pins if event.index in VALVE_PINS])
@@ -105,8 +113,7 @@ def test_valves_switch_when_the_record_of_a_walk_has_them_switch(rig, uno):
     modeled_s = modeled_s[modeled_s < trial.time_s[-1] - 0.1]
     late_s = np.array([edges_s[np.argmin(np.abs(edges_s - t))] for t in modeled_s]) - modeled_s
     assert len(late_s) > 40
-    assert np.abs(late_s).max() < 0.6e-3
-    assert abs(late_s.mean()) < 0.1e-3
+    assert np.abs(late_s).max() < 0.1e-3
 
 
 @pytest.mark.uno

@@ -39,6 +39,25 @@ def test_trials_side_by_side_are_predicted_as_each_alone(system, theta):
             np.testing.assert_allclose(channels[name], expected, atol=2e-3 * np.ptp(expected) + 1e-9, err_msg=name)
 
 
+def test_pressures_are_means_over_the_time_for_which_the_uno_averages(system, theta):
+    """24 conversions of 104 us. During a snap against the wall the instantaneous pressure is another."""
+    walk = next(t for t in system.trials if t.experiment == "locomotion")
+
+    def seen(late_s, averaged_s=0.0):
+        payload = replace(walk.payload, time_s=walk.payload.time_s + late_s, averaged_s=averaged_s)
+        return system.predict(theta, (), replace(walk, payload=payload))
+
+    off, off_at_once = [], []
+    for late_s in np.arange(0.002, 0.012, 0.001):
+        each = [seen(late_s + 104e-6 * (k - 11.5)) for k in range(24)]
+        averaged, at_once = seen(late_s, averaged_s=0.0025), seen(late_s)
+        for name in ("pressure_head_psi", "pressure_tail_psi"):
+            mean = np.mean([columns[name] for columns in each], axis=0)
+            off.append(averaged[name] - mean)
+            off_at_once.append(at_once[name] - mean)
+    assert np.std(off) < 0.4 * np.std(off_at_once)
+
+
 def test_statics_alone_give_the_areas(system, theta, lab):
     assert theta["body_area_N_psi"] == pytest.approx(lab.large.area, rel=0.002)
     assert theta["small_area_N_psi"] == pytest.approx(lab.small.area, rel=0.002)

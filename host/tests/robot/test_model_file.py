@@ -35,7 +35,7 @@ INSERTED = {
         "friction = nan",
         f"friction = 1{400 * '0'}",
         "dead_time_s = 0.2",
-        "switch_error_s = 0.2",
+        "tick_s = 0.2",
         "wind = 1.0",
     )
 }
@@ -61,7 +61,7 @@ def test_round_trip_keeps_every_number(tmp_path):
     changed = replace(
         model.with_values({"mu_k": 0.35, "body_area_N_psi": 8.7}),
         covariance=Covariance(("mu_k", "body_area_N_psi"), np.array([[1e-4, 2e-5], [2e-5, 1e-2]])),
-        scatter=Scatter(0.011, 0.02, 0.3, 0.001, 0.9977, 0.004, 0.0005),
+        scatter=Scatter(0.011, 0.02, 0.3, 0.001, 0.9977, 0.004, 0.001),
     )
     save_model(tmp_path / "m.toml", changed)
     back = load_model(tmp_path / "m.toml")
@@ -71,6 +71,14 @@ def test_round_trip_keeps_every_number(tmp_path):
     assert back.scatter == changed.scatter
     assert back.covariance.names == changed.covariance.names
     np.testing.assert_array_equal(back.covariance.matrix, changed.covariance.matrix)
+
+
+def test_a_model_of_an_earlier_version_loads_without_its_error_of_the_switching_times(tmp_path):
+    save_model(tmp_path / "m.toml", replace(nominal(), scatter=Scatter(0.011)))
+    text = (tmp_path / "m.toml").read_text().replace("tick_s = 0.0", "switch_error_s = 0.0005")
+    (tmp_path / "m.toml").write_text(text)
+    assert "switch_error_s" in text
+    assert load_model(tmp_path / "m.toml").scatter == Scatter(0.011)
 
 
 def test_learnt_curves_are_kept_and_act(tmp_path):

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from bifa import simulate
 from bifa.robot import Gait, cpg
+from bifa.robot.gait import gait_rows
 from bifa.simulate import TimelineError
 from bifa.simulate.timeline import gait_switches
 
@@ -43,6 +46,39 @@ def test_many_gaits_at_once_are_vented_between_the_supplies_as_one_is():
     one = simulate.vented_between(simulate.of_gait(gait, 20.0), 0.004)
     np.testing.assert_allclose(line.time_s, one.time_s, atol=1e-12)
     np.testing.assert_array_equal(line.at(np.arange(0.0, 20.0, 1e-3)), one.at(np.arange(0.0, 20.0, 1e-3)))
+
+
+@given(
+    gait=st.builds(
+        Gait,
+        st.integers(500_000, 8_000_000).map(lambda us: us * 1e-6),
+        *[st.integers(0, 360_000).map(lambda mdeg: mdeg * 1e-3)] * 2,
+        *[st.integers(0, 10_000).map(lambda e4: e4 * 1e-4)] * 3,
+    )
+)
+@example(Gait(4.401, 180.0, 90.0, 0.5, 0.5, 0.25))  # phases that pass a threshold exactly between two ticks
+def test_valves_switch_at_the_ticks_at_which_the_integer_oscillators_pass_the_thresholds(gait):
+    """lib/cpg: phases are integers of 32 bits, those of the body with a fraction of 8, half a tick ahead."""
+    ticks, full = np.arange(1, 20_000, dtype=np.uint64), 1 << 32
+    increment = (1000 << 40) // round(1e6 * gait.period_s)
+    body = (increment >> 9) + (ticks * np.uint64(increment) >> np.uint64(8))
+    turns = [round(1e3 * ahead_deg) % 360_000 * full // 360_000 for ahead_deg in (0.0, gait.psi12_deg, gait.psi13_deg)]
+    positive = [
+        ((body + np.uint64(turn)) % np.uint64(full) | np.uint64(1)) > min(round(1e4 * duty) * full // 10_000, full - 1)
+        for turn, duty in zip(turns, cpg.duties(gait), strict=True)
+    ]
+    line = simulate.of_gait(gait, 20.0, 2 * np.pi * 0.001 / gait.period_s, tick_s=0.001)
+    found = line.at(1e-3 * (ticks.astype(float) - 0.5))  # the first switches are decided by the phases after one tick
+    np.testing.assert_array_equal(found.T, positive)
+
+
+def test_a_slow_clock_has_long_ticks_and_the_gait_is_rounded_in_its_units():
+    gait = Gait(3.1234567, 263.30049, 97.7, 0.47004, 0.53, 0.61)
+    whole = Gait(3.123457, 263.3, 97.7, 0.47, 0.53, 0.61)
+    (slow,) = gait_switches(gait_rows([gait]) * [1.004, 1, 1, 1, 1, 1], np.array([10.0]), tick_s=1.004e-3)
+    line = simulate.of_gait(whole, 10.0, tick_s=1e-3)
+    assert len(line.time_s) - len(slow.time_s) in (0, 1)
+    np.testing.assert_allclose(slow.time_s, 1.004 * line.time_s[: len(slow.time_s)], atol=1e-9)
 
 
 def test_off_is_vented_and_nan_in_a_record():
