@@ -108,12 +108,13 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 class RoundSteps:
     """The steps of a round.
 
-    complete(dataset, suspected): diagnose all data, suspecting the effects that the model had before; returns the
-    completed model. optimize(model, walked): return its gait, starting also from those walked before, or None if
-    the model expects it not to walk. walk(number, model, gait, folder): walk it into a data set; rounds count from 2.
+    complete(dataset, model): diagnose all data, suspecting the effects of the model before and starting at its values:
+    from the nominal ones, a fit to walks near the edge often ends in a local optimum. Returns the completed model.
+    optimize(model, walked): return its gait, starting also from those walked before, or None if the model expects it
+    not to walk. walk(number, model, gait, folder): walk it into a data set; rounds count from 2.
     """
 
-    complete: Callable[[Dataset, tuple[str, ...]], Model]
+    complete: Callable[[Dataset, Model], Model]
     optimize: Callable[[Model, tuple[Gait, ...]], Gait | None]
     walk: Callable[[int, Model, Gait, Path], Dataset]
 
@@ -180,7 +181,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, steps: RoundSteps) -> N
     while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
-        completed = steps.complete(dataset, tuple(model.effects))
+        completed = steps.complete(dataset, model)
         # If no effect is left, the fits have gone wrong: the model that explained the bench data is kept.
         if model.effects and not completed.effects:
             completed = model

@@ -181,9 +181,9 @@ def _walk(
 
 
 def _run_diagnosis(
-    setup: Setup, on_progress: OnProgress, dataset: Dataset, suspected: Collection[str] = ()
+    setup: Setup, on_progress: OnProgress, dataset: Dataset, suspected: Collection[str] = (), begin: Model | None = None
 ) -> Diagnosis:
-    system, on_step = prepare(dataset), lambda what: on_progress(spoken(what), 0.0)
+    system, on_step = prepare(dataset, begin), lambda what: on_progress(spoken(what), 0.0)
     found = diagnose(system, seed=setup.seed, suspected=suspected, on_progress=on_step)
     return with_doubts(found, system)
 
@@ -213,8 +213,8 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
 
 
 def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: OnProgress) -> Stage:
-    def complete(dataset: Dataset, suspected: tuple[str, ...]) -> Model:
-        return completed_model(_run_diagnosis(setup, on_progress, dataset, suspected).told)
+    def complete(dataset: Dataset, model: Model) -> Model:
+        return completed_model(_run_diagnosis(setup, on_progress, dataset, tuple(model.effects), model.base).told)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
