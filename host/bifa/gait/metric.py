@@ -48,11 +48,11 @@ class Metric:
     `periodic` (relative to the advance, or to 1 mm if that is more) and slip at most `slip_m` each. Slip is travel
     while both ends slide. tolerance_m: of the integrator, per step. direction: -1 to count backward walking.
     inclination_deg: of the pipe, uphill positive. clock: seconds per second of the Uno, to which gaits and speeds
-    refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies; tick_s: on
-    the same clock, of the Uno, 0 if valves switch at any time. unlike: every cycle
-    differs from the one before, so that no walk settles. settled: relative difference between the advances of three
-    successive cycles at which a walk counts as settled, and the other cycles are not simulated: of ten it takes five or
-    six. 0 to simulate all. looser: factor on the tolerance of the small actuators' states. single: in single precision.
+    refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies. tick_s: the Uno's
+    tick on the same clock, 0 if valves switch at any time. unlike: every cycle differs from the one before, so that no
+    walk settles. settled: relative difference between the advances of three successive cycles at which a walk counts as
+    settled, and the other cycles are not simulated: of ten it takes five or six. 0 to simulate all. looser: factor on
+    the tolerance of the small actuators' states. single: in single precision.
     """
 
     cycles: int = 10
