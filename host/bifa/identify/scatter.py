@@ -48,16 +48,14 @@ def session_drifts(fit: Fit) -> dict[str, float]:
 
 
 def switch_timing(system: RobotSystem) -> Scatter:
-    """Mean switch timing of the walks: near the edge, 0.25 % of the period or a few milliseconds decide."""
+    """The Uno's timekeeping, means over the walks: near the edge, 0.25 % of the period or a few milliseconds decide."""
     walks = [trial for trial in system.dataset.trials if trial.experiment == WALK]
     if not walks:
         return Scatter()
     clock = float(np.mean([seconds_per_uno_s(trial) for trial in walks]))
-    noted = {
-        name: round(float(np.mean([trial.extra.get(name, 0.0) for trial in walks])), 6)
-        for name in ("dead_time_s", "tick_s")
-    }
-    return Scatter(clock=round(clock, 6), **noted)
+    dead_time_s = float(np.mean([trial.extra.get("dead_time_s", 0.0) for trial in walks]))
+    tick_s = max(trial.extra.get("tick_s", 0.0) for trial in walks)  # not noted is unknown, not another tick
+    return Scatter(clock=round(clock, 6), dead_time_s=round(dead_time_s, 6), tick_s=tick_s)
 
 
 def _between_runs(fit: Fit) -> float:

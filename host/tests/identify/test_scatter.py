@@ -27,7 +27,7 @@ def test_the_scatter_says_how_the_uno_keeps_time():
     noted = {"clock_rate": 1.004, "dead_time_s": 0.004, "tick_s": 0.001}
     trials = (first, replace(first, repeat=2, extra=noted))
     timing = switch_timing(SimpleNamespace(dataset=Dataset(None, "day", {}, trials)))
-    assert timing == Scatter(clock=0.99701, dead_time_s=0.002, tick_s=0.0005)
+    assert timing == Scatter(clock=0.99701, dead_time_s=0.002, tick_s=0.001)
 
 
 def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():
