@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from statistics import mean
+from statistics import mean, median
 from typing import Any
 
 import numpy as np
@@ -208,10 +208,12 @@ def _against(gains: Sequence[Gain]) -> dict[str, float]:
     speed = [{name: mean(gait.runs_mm_s) for name, gait in gaits.items()} for gaits in pairs]
     gain = mean(one["edge"] for one in speed) / mean(one["robust"] for one in speed) - 1.0
     slower = max(max(one["naive"], one["fair"]) / max(one["edge"], 1e-9) - 1.0 for one in speed)
+    errors = [mean(gaits["edge"].runs_mm_s) / gaits["edge"].predicted_mm_s - 1.0 for gaits in pairs]
+    print(f"speed walked at the edge against the predicted one: {100 * median(errors):+.2f} % (median)")
     print(
         f"edge against the robust gait: {100 * gain:+.1f} % on average; at worst {100 * slower:.1f} % behind the base"
     )
-    return {"loop_edge_gain": gain, "loop_edge_worst_behind_base": slower}
+    return {"loop_edge_median_error": median(errors), "loop_edge_gain": gain, "loop_edge_worst_behind_base": slower}
 
 
 def reliability(gains: Sequence[Gain], bins: Sequence[float] = (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)) -> list[tuple]:

@@ -76,8 +76,8 @@ def speeds(
     shares = [slice(first, None, pieces) for first in range(min(pieces, n))]
     if executor is None and len(shares) > 1:
         executor = _pool(count)
-    where = inclination_deg, terrain
-    run = partial(_progress, cycles, tolerance_m, *where, dead_time_s, tick_s, settled, looser, single)
+    how = (inclination_deg, terrain, dead_time_s, tick_s, settled, looser, single)
+    run = partial(_progress, cycles, tolerance_m, *how)
     each: Callable[..., Any] = executor.map if executor else map
     found = each(run, [flats[share] for share in shares], [gaits[share] for share in shares])
     advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))

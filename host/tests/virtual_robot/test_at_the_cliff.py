@@ -37,7 +37,10 @@ def predicted_mm_s(gait, tick_s=TICK_S):
     return predict_speed(model, spread_of(model), gait, draws=4).speed_mm_s
 
 
-@pytest.mark.parametrize(("longer", "walks"), [(17e-4, True), (16e-4, False), (14e-4, True), (12e-4, False)])
+@pytest.mark.parametrize(
+    ("longer", "walks"),
+    [(17e-4, True), (16e-4, False), (15e-4, True), (14e-4, True), (13e-4, True), (12e-4, False)],
+)
 def test_the_robot_walks_with_the_gaits_with_which_it_is_predicted_to(longer, walks):
     fast = library.load("fast").gait
     gait = replace(fast, period_s=(1.0 + longer) * fast.period_s)
