@@ -148,7 +148,8 @@ def test_ctrl_z_stops_the_robot_then_suspends_and_what_is_resumed_ends(console, 
     console.until(lambda: uno.board.valves != 0)
     console.presses(CTRL_Z)
     console.until(lambda: is_suspended(console))
-    assert (uno.board.valves, uno.board.state) == (0, "stopped")
+    console.until(lambda: (uno.board.valves, uno.board.state) == (0, "stopped"))  # the byte may still be on its way
+    assert is_suspended(console)
     console.program.kill(signal.SIGCONT)
     assert console.exit_status() == 0
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
