@@ -48,7 +48,7 @@ def robots(count: int, models: Path | None = None) -> Iterator[tuple[str, Model,
     """Name, model and search settings of each robot."""
     if models:
         for file in sorted(models.rglob("model-last.toml")):
-            yield file.parent.relative_to(models).as_posix(), load_model(file), Settings(share=AT_EDGE)
+            yield file.parent.relative_to(models).as_posix(), load_model(file), Settings(share=AT_EDGE, walking=True)
     names = sorted(effects.library())
     for k in range(count):
         if k < 2:

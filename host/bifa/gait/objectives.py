@@ -1,4 +1,5 @@
-"""The objectives: speed on the nominal model, or the speed that nearly every robot reaches."""
+"""The objectives: speed on the model itself, or the speed that nearly every robot reaches, or the model's own among the
+gaits with which nearly every robot walks."""
 
 import math
 from collections.abc import Sequence
@@ -7,6 +8,7 @@ import numpy as np
 
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.pool import Simulations
+from bifa.gait.prediction import MIN_SPEED_RATIO
 from bifa.gait.space import SearchSpace
 from bifa.simulate import Plant
 
@@ -37,7 +39,7 @@ class RobustSpeed:
 
     jitter: every draw walks all gaits slower or faster by a fixed fraction of its own within it. At the cliff the set
     of periods with which a robot walks is ragged, and a climb ends on the first spike; over draws that differ in period
-    narrower spikes average out.
+    narrower spikes average out. walking: count speeds by `as_walked`.
     """
 
     def __init__(
@@ -50,8 +52,9 @@ class RobustSpeed:
         share: float = QUANTILE,
         abandon: float = 0.9,
         jitter: float = 0.0,
+        walking: bool = False,
     ):
-        self._runs, self._space, self._draws = runs, space, draws
+        self._runs, self._space, self._draws, self._walking = runs, space, draws, walking
         self._metric = metric.of_draws()
         self._own = NominalSpeed(runs, nominal, space, self._metric)
         self._rank = max(1, math.ceil(share * len(draws)))
@@ -65,14 +68,16 @@ class RobustSpeed:
         draws = len(self._draws)
         order = np.argsort(-self._failures, kind="stable")
         met = np.full((len(rows), draws), np.inf)
-        bound = self._own(points)
+        own = self._own(points)
+        bound = own.copy()
         alive = np.flatnonzero(bound >= max(self._abandon * self._best, 1e-9))
         done, size = 0, _FIRST_DRAWS + self._rank
         min_draws = size if self._failures.any() else draws  # draws before a batch may settle a gait
         while alive.size and done < draws:
             batch = order[done : done + size]
             gaits, which = np.repeat(alive, len(batch)), np.tile(batch, alive.size)
-            met[gaits, which] = self._speeds(rows[gaits], which)
+            speeds = self._speeds(rows[gaits], which)
+            met[gaits, which] = as_walked(speeds, own[gaits]) if self._walking else speeds
             done, size = done + len(batch), 2 * size
             slowest = np.partition(met[alive], self._rank - 1)[:, self._rank - 1]
             settled = (slowest >= bound[alive]) & (done > min_draws) | (done >= draws)
@@ -87,6 +92,12 @@ class RobustSpeed:
         longer = self._longer[which]
         jittered = np.column_stack([rows[:, 0] * longer, rows[:, 1:]])
         return self._runs.judged(self._draws, which, jittered, self._metric).counted_mm_s * longer
+
+
+def as_walked(speeds_mm_s: np.ndarray, own_mm_s: np.ndarray | float) -> np.ndarray:
+    """Speeds of drawn robots, those that walk counted as the model's own: how fast each walks is no risk, that it may
+    fall is. Low quantiles are then the model's own speed, as long as enough robots walk."""
+    return np.where(speeds_mm_s >= MIN_SPEED_RATIO * own_mm_s, own_mm_s, speeds_mm_s)
 
 
 def on_model(runs: Simulations, nominal: Plant, gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:

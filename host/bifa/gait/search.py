@@ -11,7 +11,7 @@ from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.methods.cma_es import BASIN_SPACING, POPULATION, TRIAL_GENERATIONS, basins, climb_basins, climb_together
 from bifa.gait.methods.common import Ends, Objective, OnEvaluated, RecordedObjective
 from bifa.gait.metric import Metric, Passage
-from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
+from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, as_walked, distribution, on_model
 from bifa.gait.pool import Simulations
 from bifa.gait.prediction import CYCLES, FINE_M, MIN_SPEED_RATIO, Prediction, predict_speed, settles
 from bifa.gait.settling import STANDING_MM_S
@@ -91,9 +91,10 @@ class Settings:
 
     evaluations: None for the method's default. spread: relative; None for what is known of the model, or 2 % if nothing
     was fitted. naive: draw robots from the covariance alone. share: fraction of the robots that may be slower than the
-    speed that is maximised. refine: follow the method with short CMA-ES runs from its best points (the paper did not).
-    begin: gaits that are known to walk; the search also starts from them, and drawn robots that do not walk with them
-    are discarded.
+    speed that is maximised. walking: maximise the model's own speed instead, among gaits with which all but `share` of
+    the robots walk. refine: follow the method with short CMA-ES runs from its best points (the paper did not). begin:
+    gaits that are known to walk; the search also starts from them, and drawn robots that do not walk with them are
+    discarded.
     """
 
     method: str = "cma"
@@ -106,6 +107,7 @@ class Settings:
     refine: bool = True
     naive: bool = False
     share: float = QUANTILE
+    walking: bool = False
     begin: tuple[Gait, ...] = ()
 
     @property
@@ -113,14 +115,19 @@ class Settings:
         """The metric that applies: a robust search judges the model itself by the rules for drawn robots."""
         return self.metric.of_draws() if self.robust else self.metric
 
+    def low_mm_s(self, speeds_mm_s: np.ndarray, own_mm_s: float, share: float) -> float:
+        """Return the quantile `share` of drawn robots' speeds as this search counts them; `own_mm_s`: the model's."""
+        return float(np.quantile(as_walked(speeds_mm_s, own_mm_s) if self.walking else speeds_mm_s, share))
+
 
 @dataclass(frozen=True)
 class Optimum:
     """The best gait found, with its predicted performance.
 
     nominal_mm_s: speed on the model itself, verified over 20 cycles with a finer step. speeds_mm_s: (n,) speeds on
-    `VERIFYING_DRAWS` robots that the search never used; quantile_mm_s: the speed that all but `settings.share` of them
-    reach. explored: everything the method evaluated. prediction: of a walk with the gait.
+    `VERIFYING_DRAWS` robots that the search never used; quantile_mm_s: what was maximised, the speed that all but
+    `settings.share` of them reach (see `Settings.low_mm_s`). explored: everything the method evaluated. prediction: of
+    a walk with the gait.
     """
 
     gait: Gait
@@ -168,7 +175,8 @@ class SearchRun:
         metric = replace(settings.metric, tolerance_m=stage.tolerance_m)
         share = stage.quantile * settings.share / QUANTILE
         nominal, space = plant(self.model), settings.space
-        return RobustSpeed(self.runs, nominal, draws, space, metric, share, stage.abandon, stage.jitter)
+        rules = (share, stage.abandon, stage.jitter, settings.walking)
+        return RobustSpeed(self.runs, nominal, draws, space, metric, *rules)
 
     def robots(self, count: int, seed: int) -> list[Plant]:
         """Draw `count` robots that walk with `settings.begin`, gaits with which the real one is known to walk: the
@@ -236,7 +244,7 @@ def optimize(
     return Optimum(
         gait,
         nominal,
-        float(np.quantile(speeds, settings.share)),
+        settings.low_mm_s(speeds, nominal, settings.share),
         speeds,
         known,
         settings,
@@ -398,7 +406,7 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
             if speed <= 0.0:
                 continue
             speeds = distribution(search.runs, checking, row[None], metric)[0]
-            low = float(np.quantile(speeds, _CHECK_QUANTILE * settings.share / QUANTILE))
+            low = settings.low_mm_s(speeds, float(speed), _CHECK_QUANTILE * settings.share / QUANTILE)
             stands = low > least
             if stands and low >= _ACCEPT_RATIO * promised:
                 return Gait(*row.tolist()), float(speed)

@@ -41,19 +41,21 @@ def test_a_short_nominal_search_doubles_the_baseline_and_stands_verification(run
     assert optimum.speeds_mm_s.shape == (VERIFYING_DRAWS,)
 
 
-def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nominal_plant):
+@pytest.mark.parametrize("walking", [False, True])
+def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nominal_plant, walking):
     draws = spread_of(nominal()).plants(nominal(), 32, seed=5)
     metric = Metric().quicker()
     near = np.array([[*ROBUST.as_dict().values()]]) * (
         1 + 0.01 * np.random.default_rng(0).normal(size=(8, 5))[:, [0, 1, 2, 3, 4, 4]]
     )
     points = SPACE.nearest([Gait(*row) for row in near.tolist()])
-    objective = RobustSpeed(runs, nominal_plant, draws, SPACE, metric, share=0.05)
+    objective = RobustSpeed(runs, nominal_plant, draws, SPACE, metric, share=0.05, walking=walking)
     robust = objective(points)
     rows = gait_rows(SPACE.gaits(points))
-    speeds = np.sort(distribution(runs, draws, rows, metric), axis=1)
+    second = np.sort(distribution(runs, draws, rows, metric), axis=1)[:, 1]  # the second smallest of 32
     alone = NominalSpeed(runs, nominal_plant, SPACE, metric)(points)
-    exact = np.minimum(speeds[:, 1], alone)  # the second smallest of 32
+    walks = walking & (second > 0.8 * alone)  # 31 of 32 robots
+    exact = np.where(walks, alone, np.minimum(second, alone))
     best = int(np.argmax(exact))
     assert robust[best] == pytest.approx(exact[best])
     assert (robust >= exact - 1e-9).all()  # abandoned early: an upper bound ...
