@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from lacuna.estimation.fit import Fit
-from lacuna.estimation.problem import Point, Problem, in_parallel
+from lacuna.estimation.problem import Problem, in_parallel
 from lacuna.estimation.sensitivity import Sensitivity
 from lacuna.estimation.solve import Solution, one_thread, solve
 
@@ -24,6 +24,7 @@ _MIN_GAIN = 1.0  # log-likelihood: after a round that gains less, derivatives fr
 # Squared change of the residuals over the expected one. Below: the step was too short, and its derivative is mostly
 # error. Above: it met a jump (a foot that slips a sample sooner).
 _CHANGE_RATIOS = (0.5, 4.0)
+_FALL = 100.0  # the same of a single trial: far over a cliff (a robot that falls), where there is no derivative
 _MAX_STEP_SCALES = 1.0  # scales: longest step of a derivative, in directions that the data leave open
 
 
@@ -50,7 +51,7 @@ def settle(fitted: Fit) -> Fit:
             break
         solution = fitted.solution
         along = _directions(problem, solution)
-        taken = _derivatives(problem, solution.point, solution.free, along)
+        taken = _derivatives(problem, solution, along)
         options: dict[str, Any] = {"free": solution.free, "sensitivities": taken, "relative": 0.0}
         here = solve(problem, solution.point, max_iterations=0, **options)
         ahead = solve(problem, solution.point, max_iterations=_STEPS, **options)
@@ -100,8 +101,11 @@ def _is_as_predicted(along: _Directions, before: np.ndarray, after: np.ndarray) 
     return bool(((seen > _CHANGE_RATIOS[0] * meant) & (seen < _CHANGE_RATIOS[1] * meant))[whole].all())
 
 
-def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _Directions) -> list[Sensitivity]:
-    """Derivatives of each trial (free parameters, its nuisances), from differences along the directions."""
+def _derivatives(problem: Problem, solution: Solution, along: _Directions) -> list[Sensitivity]:
+    """Derivatives of each trial (free parameters, its nuisances), from differences along the directions. In a direction
+    in which a trial falls off a cliff, its earlier derivative holds: a single fall would otherwise pass for information
+    on every parameter."""
+    point, free = solution.point, solution.free
     values = np.tile(point.values, (len(free), 1))
     values[:, list(free)] += along.structure.T
     back = np.linalg.inv(along.structure)
@@ -111,6 +115,9 @@ def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _
         both = zip(values, nuisances + follow.T, strict=True)
         alone = ((point.values, nuisances + step) for step in np.diag(spread))
         changes = problem.changes(i, (point.values, nuisances), [*both, *alone])
+        steps = np.block([[along.structure.T, follow.T], [np.zeros((len(spread), len(free))), np.diag(spread)]])
+        for k in np.flatnonzero((changes**2).sum(axis=1) > _FALL):
+            changes[k] = solution.sensitivities[i].times(steps[k])
         own = changes[len(free) :] / spread[:, None]
         taken = np.vstack([back.T @ (changes[: len(free)] - follow.T @ own), own])
         return Sensitivity.of(taken, range(len(taken)), len(free), len(nuisances))

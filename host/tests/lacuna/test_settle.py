@@ -127,6 +127,26 @@ class WithinBounds(Lines):
         return super().predict(theta, effects, trial, **how)
 
 
+class AtACliff(Lines):
+    """Lines of which the first falls if `bent` differs from `stands` by more than a tenth of its standard deviation."""
+
+    stands = TRUTH["bent"]
+
+    def predict(self, theta, effects, trial, **how):
+        falls = trial.name == "0" and abs(theta["bent"] - self.stands) > 0.1 * expected_sd(4)[1]
+        return {"y_m": super().predict(theta, effects, trial, **how)["y_m"] - (30.0 * SD if falls else 0.0)}
+
+
+def test_a_trial_that_falls_within_a_step_does_not_pass_for_information():
+    for seed in SEEDS:
+        rough = fitted(Lines(runs=4, seed=seed))
+        system = AtACliff(runs=4, seed=seed)
+        system.stands = rough.theta["bent"]
+        settled = settle(replace(rough, problem=Problem(Structure(system), system.trials, FLOOR)))
+        assert settled.cost <= rough.cost
+        assert stated_sd(settled) == pytest.approx(expected_sd(4), rel=0.3)  # a quarter of it is of rough derivatives
+
+
 def test_derivatives_by_a_factor_are_those_of_what_it_multiplies():
     system = Lines(3, factor_of=tuple(TRUTH))
     problem = Problem(Structure(system), system.trials, FLOOR)
