@@ -15,7 +15,7 @@ least four fifths of the prediction, and by 1 mm/s.
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -84,8 +84,9 @@ def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) ->
     stages = campaign(setup, effort or Effort(), lambda what, share: None)
     run_stages(folder, stages, on_start=_begun)
     summary = json.loads((folder / "summary.json").read_text())
-    gaits = walked(folder, setup, effort or Effort())
-    inside = tuple(one["inside"] for one in read_rounds(folder / "rounds.json") if one["at_edge"])
+    rounds = read_rounds(folder / "rounds.json")
+    gaits = walked(folder, rounds, setup, effort or Effort())
+    inside = tuple(one["inside"] for one in rounds if one["at_edge"])
     print("\r" + " " * 60, end="\r")
     return Gain(effect, seed, tuple(found["name"] for found in summary["effects"]), gaits, inside)
 
@@ -104,11 +105,11 @@ def _begun(stage: Stage) -> None:
     print(f"\r{stage.title:60}", end="", flush=True)
 
 
-def walked(folder: Path, setup: Setup, effort: Effort) -> dict[str, Walked]:
+def walked(folder: Path, rounds: Sequence[Mapping[str, Any]], setup: Setup, effort: Effort) -> dict[str, Walked]:
     """The gaits of a finished campaign in `folder`; the base model's gaits at its edge are found and walked here."""
     found = {"baseline": "walks-base", "robust": "walks-completed"}
     models = dict.fromkeys(found, "model-completed.toml")
-    if number := fastest_at_edge(read_rounds(folder / "rounds.json")):
+    if number := fastest_at_edge(rounds):
         found["edge"], models["edge"] = f"rounds/walks-{number}", f"rounds/model-{number}.toml"
     # As long as the campaign's longest walk: with a tether that lengthens, short walks look too fast.
     least = max(_cycles(folder / place) for place in found.values())

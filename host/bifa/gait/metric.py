@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifa.gait.settling import MAX_CYCLES
+from bifa.robot.model import Scatter
 from bifa.simulate import Advance
 from bifa.simulate.rigs import CLEAR
 from bifa.simulate.terrain import passed_at_m, terrain, tunnel
@@ -24,6 +25,7 @@ _SETTLED = 1e-3
 # A search reads no pressures, and when a small actuator snaps hardly moves the advance: at ten times the tolerance for
 # their states a walk takes two thirds of the steps, and the same robots fall.
 _LOOSER = 10.0
+_EXACT = Scatter()  # valves that switch when the gait says
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,11 @@ class Metric:
     cycles: number simulated, from rest. judged: number of last cycles whose mean speed counts; they must agree within
     `periodic` (relative to the advance, or to 1 mm if that is more) and slip at most `slip_m` each. Slip is travel
     while both ends slide. tolerance_m: of the integrator, per step. direction: -1 to count backward walking.
-    inclination_deg: of the pipe, uphill positive. clock: seconds per second of the Uno, to which gaits and speeds
-    refer. dead_time_s: time on the Uno's clock for which a chamber is vented between the supplies. tick_s: the Uno's
-    tick on the same clock, 0 if valves switch at any time. unlike: every cycle differs from the one before, so that no
-    walk settles. settled: relative difference between the advances of three successive cycles at which a walk counts as
-    settled, and the other cycles are not simulated: of ten it takes five or six. 0 to simulate all. looser: factor on
-    the tolerance of the small actuators' states. single: in single precision.
+    inclination_deg: of the pipe, uphill positive. timing: the Uno's timekeeping; gaits and speeds are on its clock.
+    unlike: every cycle differs from the one before, so that no walk settles. settled: relative difference between the
+    advances of three successive cycles at which a walk counts as settled, and the other cycles are not simulated: of
+    ten it takes five or six. 0 to simulate all. looser: factor on the tolerance of the small actuators' states. single:
+    in single precision.
     """
 
     cycles: int = 10
@@ -62,9 +63,7 @@ class Metric:
     tolerance_m: float = 1e-5
     direction: int = 1
     inclination_deg: float = 0.0
-    clock: float = 1.0
-    dead_time_s: float = 0.0
-    tick_s: float = 0.0
+    timing: Scatter = _EXACT
     unlike: bool = False
     settled: float = _SETTLED
     looser: float = _LOOSER
@@ -120,9 +119,7 @@ class Passage:
     cycles: int = 16
     tolerance_m: float = 1e-5
     inclination_deg: float = 0.0
-    clock: float = 1.0
-    dead_time_s: float = 0.0
-    tick_s: float = 0.0
+    timing: Scatter = _EXACT
     looser: float = _LOOSER
     single: bool = True
     settled = 0.0  # not a field: no walk ends early

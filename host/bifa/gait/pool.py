@@ -22,15 +22,16 @@ class Simulations:
     def judged(self, plants: Sequence[Plant], which: np.ndarray, gaits: np.ndarray, metric: Metric | Passage) -> Judged:
         """Simulate `gaits` (n, 6), row k on the robot `plants[which[k]]`, and judge the walks."""
         self.count += len(gaits)
+        timing = metric.timing
         progress = speeds(
             [plants[i] for i in which],
-            gaits * np.array([metric.clock, 1.0, 1.0, 1.0, 1.0, 1.0]),
+            gaits * np.array([timing.clock, 1.0, 1.0, 1.0, 1.0, 1.0]),
             metric.cycles,
             metric.tolerance_m,
             inclination_deg=metric.inclination_deg,
             terrain=metric.terrain,
-            dead_time_s=metric.dead_time_s * metric.clock,
-            tick_s=metric.tick_s * metric.clock,
+            dead_time_s=timing.dead_time_s * timing.clock,
+            tick_s=timing.tick_s * timing.clock,
             settled=metric.settled,
             looser=metric.looser,
             single=metric.single,

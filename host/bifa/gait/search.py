@@ -217,8 +217,7 @@ def optimize(
     started = runs.count
     known = spread_of(model, settings.spread)
     known = known.naive if settings.naive else known
-    timing = known.scatter
-    metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s, tick_s=timing.tick_s)
+    metric = replace(settings.metric, timing=known.scatter.timing)
     if not settles(model):
         metric = metric.of_unlike_cycles()
     settings = replace(settings, metric=metric)

@@ -149,7 +149,9 @@ def test_how_the_uno_keeps_time_is_known_whatever_the_spread():
 def test_the_search_knows_the_clock(runs, nominal_plant):
     """For a gait sought without it, 0.95 of the robots were predicted to walk; on a clock 0.23 % fast, 0.79 did."""
     judged = (
-        runs.judged([nominal_plant], np.zeros(1, int), gait_rows([BASELINE]), Metric(clock=c, tolerance_m=1e-6))
+        runs.judged(
+            [nominal_plant], np.zeros(1, int), gait_rows([BASELINE]), Metric(timing=Scatter(clock=c), tolerance_m=1e-6)
+        )
         for c in (1.0, 0.9)
     )
     plain, fast = (one.speed_mm_s[0] for one in judged)
