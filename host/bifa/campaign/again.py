@@ -1,7 +1,7 @@
 """Approach the edge in steps that risk little, with walks fed back as data.
 
 The robust gait of the completed model is walked first, then the one at the edge of what is known of it. After each
-round the walks are added to the data and the model is completed again before the next gait is sought: a walk that was
+round the walks are added to the data and the model is fitted again before the next gait is sought: a walk that was
 predicted narrows the uncertainty and so moves the edge; one that was not, or that failed, corrects the model.
 """
 
@@ -108,8 +108,8 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 class RoundSteps:
     """The steps of a round.
 
-    complete(dataset, model): diagnose all data, suspecting the effects of the model before and starting at its values:
-    from the nominal ones, a fit to walks near the edge often ends in a local optimum. Returns the completed model.
+    complete(dataset, model): fit the model before to all data, from its values; diagnose them, suspecting its effects,
+    if that leaves something that matters. Returns the completed model.
     optimize(model, walked): return its gait, starting also from those walked before, or None if the model expects it
     not to walk. walk(number, model, gait, folder): walk it into a data set; rounds count from 2.
     """

@@ -25,6 +25,7 @@ from bifa.gait.uncertainty import SPREAD
 from bifa.identify.completed import completed_model
 from bifa.identify.doubts import with_doubts
 from bifa.identify.identification import identify
+from bifa.identify.refit import refitted
 from bifa.identify.start import prepare
 from bifa.measure import plan
 from bifa.measure.session import run_session
@@ -216,6 +217,9 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
 
 def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: OnProgress) -> Stage:
     def complete(dataset: Dataset, model: Model) -> Model:
+        known = refitted(dataset, model, setup.seed, lambda what: on_progress(spoken(what), 0.0))
+        if known:
+            return known
         return completed_model(_run_diagnosis(setup, on_progress, dataset, tuple(model.effects), model.base).told)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:

@@ -62,6 +62,14 @@ class FittedCurve:
         coefficients = self.fit.coefficients + np.asarray(weights) @ self.shapes
         return StiffnessCurve(tuple(chebyshev.cheb2poly(coefficients)), self.fit.lower_m, self.fit.upper_m)
 
+    def weights_of(self, curve: StiffnessCurve) -> dict[str, float]:
+        """The shapes' weights, by name, with which this curve comes closest to `curve`, such as one fitted before."""
+        z = chebyshev.chebpts1(4 * (DEGREE + 1))
+        x = 0.5 * (self.fit.lower_m + self.fit.upper_m) + 0.5 * (self.fit.upper_m - self.fit.lower_m) * z
+        missing_N = curve.force(x) - chebyshev.chebval(z, self.fit.coefficients)
+        weights = np.linalg.lstsq(chebyshev.chebval(z, self.shapes.T).T, missing_N)[0]
+        return dict(zip(self.names, np.clip(weights, -_WIDEST, _WIDEST).tolist(), strict=True))
+
     @cached_property
     def tables(self) -> Family:
         """The family of curves spanned by the shapes, as tables for the simulator."""

@@ -39,7 +39,7 @@ from lacuna.estimation.settle import settle
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import intervals
-from lacuna.system import System
+from lacuna.system import System, Theta
 
 _ROUGH, _FINE = 1e-3, 1e-4  # relative to the cost: tolerances of an intermediate fit and of a reported one
 _MAX_TO_REFIT = 5.0  # times the relevance threshold: no refit to a few more trials brings a larger remainder below it,
@@ -85,11 +85,21 @@ class Case:
         return any(p.factor_of for trial in self.split.known for p in self.system.nuisances(trial))
 
     def fit_base(self, starts: int) -> Fit:
-        """Fit the base model, with a floor from repeats' residuals in all trials but the final ones."""
-        structure, split = Structure(self.system), self.split
-        floor = estimate_noise(self.system, split.fit + split.judging)
+        """Fit the base model from `starts` initial guesses."""
+        structure = Structure(self.system)
         vectors = spread_starts(structure, structure.start(), starts, self.seed)
-        first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH, graduated=True)
+        return self._first(structure, starts=vectors, max_iterations=30, relative=_ROUGH, graduated=True)
+
+    def fit_from(self, effects: tuple[str, ...], values: Theta) -> Fit:
+        """Fit the base model with `effects` from these values, by name, of an earlier fit."""
+        structure = Structure(self.system, effects)
+        return self._first(structure, starts=[structure.start(values)], relative=_FINE)
+
+    def _first(self, structure: Structure, **how: Any) -> Fit:
+        """A first fit, with a floor from repeats' residuals in all trials but the final ones."""
+        split = self.split
+        floor = estimate_noise(self.system, split.fit + split.judging)
+        first = fit(structure, split.fit, floor, **how)
         residuals = first.residuals() | evaluate_on(first, split.judging).residuals()
         sharper = floor.lowered_by(estimate_noise(self.system, split.fit + split.judging, residuals))
         return self._again(first, sharper)

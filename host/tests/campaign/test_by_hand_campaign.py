@@ -181,6 +181,7 @@ def walks(lab, folder, said, stop_at=None):
 def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, monkeypatch):
     slightly = ROBOT.with_effects({"hysteresis": {"force_N": 1e-9}})
     diagnosed = Mock(return_value=SimpleNamespace(told=slightly))
+    monkeypatch.setattr(loop, "refitted", lambda *_: None)
     monkeypatch.setattr(loop, "prepare", lambda dataset, begin: dataset)
     monkeypatch.setattr(loop, "diagnose", diagnosed)
     monkeypatch.setattr(loop, "with_doubts", lambda found, system: found)

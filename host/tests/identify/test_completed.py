@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bifa.identify.completed import completed_model, labeled
+from bifa.identify.refit import values_of
 from bifa.identify.start import prepare
 from bifa.robot import load_model, save_model
 from harness.independent_lab import IndependentLab
@@ -43,3 +44,13 @@ def test_a_fitted_model_says_where_each_value_comes_from_and_a_completed_one_wha
     model = labeled(system.model.with_effects({"choked_flow": {}}), system, "bifa diagnose")
     assert model.name == "monday with choked flow"
     assert model.provenance == "bifa diagnose: fitted to 8 trials of monday, completed by choked flow"
+
+
+def test_a_model_gives_back_the_values_that_it_was_made_from(system):
+    random = np.random.default_rng(5)
+    structure = Structure(system, ("hysteresis",))
+    theta = structure.theta(structure.start())
+    theta |= {"body_area_N_psi": 9.4, "hysteresis.force_N": 2.5}
+    theta |= {name: 3.0 * random.standard_normal() for name in theta if "_shape_" in name}
+    found = values_of(system, system.model_at(theta, ("hysteresis",)))
+    assert {name: found[name] for name in theta} == pytest.approx(theta, rel=1e-6, abs=1e-6)
