@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.solve import one_thread
@@ -17,7 +17,6 @@ def refit(
     values: Theta,
     *,
     seed: int = 0,
-    policy: Policy = POLICY,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> Fit | None:
     """Fit the base model with `effects` to the trials of `system`, starting at `values` (parameters by name, those of
@@ -27,7 +26,7 @@ def refit(
     split = split_trials(system.trials, system.spare(), system.test())
     if not (split.fit and split.judging):
         return None
-    case = Case(system, split, policy, seed)
+    case = Case(system, split, POLICY, seed)
     on_progress("fitting the known effects to more data" if effects else "fitting the base model to more data")
     candidate = case.sharpen(case.judge(case.fit_from(tuple(effects), values)))
     if not case.suffices(candidate):
