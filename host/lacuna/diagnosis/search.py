@@ -7,7 +7,7 @@ from itertools import combinations
 from lacuna.diagnosis.candidate import Candidate, judge, refitted_without, sharpened_floor
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.learn import free_form
-from lacuna.diagnosis.race import NEAR, joined, race
+from lacuna.diagnosis.race import NEAR, joined, race, refit_multi_start
 from lacuna.diagnosis.score import Promise, Scores, Screened, score
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
@@ -59,8 +59,9 @@ def search(
     keep: Callable[[Sequence[Candidate]], None] = lambda _: None,
 ) -> Search:
     """Race single effects, then pairs, then sets of three, until a set satisfies `enough(candidate)` or no larger set
-    promises to remove its share of what is left. Before another effect is added to the best set of a size, the set is
-    also tried in freed form. `keep` is called with every batch of candidates, so that they survive an interruption."""
+    promises to remove its share of what is left. Before the best set of a size grows, it is also fitted from other
+    starts if it leaves little, and tried in freed form. `keep` is called with every batch of candidates, so that they
+    survive an interruption."""
     split, floor = case.split, first.fitted.problem.floor
 
     def raced(parent: Candidate, promises: Sequence[Promise]) -> list[Candidate]:
@@ -100,6 +101,13 @@ def search(
             ranked = _ranked(tried, size)
         if enough(ranked[0]):
             break
+        if case.nearly(ranked[0]):  # it may be in a local optimum
+            better = refit_multi_start(ranked[0], split, case.seed, workers)
+            keep([better])
+            keep_best(tried, [better])
+            ranked = _ranked(tried, size)
+            if enough(ranked[0]):
+                break
         if own := free_form(ranked[0], split, workers):
             freed.append(own)
             if ranked[0].left < case.policy.half * tried[frozenset()].left and enough(own):

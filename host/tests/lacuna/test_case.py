@@ -6,6 +6,7 @@ from toy import NOBODY, case_of, hide, moved
 
 from lacuna.diagnosis import case as case_module
 from lacuna.diagnosis import race as race_module
+from lacuna.diagnosis import search as search_module
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.race import refit_multi_start
 from lacuna.diagnosis.score import remaining_after, score
@@ -104,6 +105,24 @@ def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case, right):
     found = search(case, case.judge(astray_by(right.fitted, 0.3)), enough=case.suffices, workers=NOBODY)
     assert found.base.cost < right.cost + 1e-3 * right.cost, "to the accuracy of such a refit"
     assert case.suffices(found.base)
+
+
+@pytest.mark.slow
+def test_the_best_set_is_fitted_from_other_starts_before_it_grows(monkeypatch):
+    case = case_of(hide({"delay.delay_s": 0.03}, seed=32))
+    base = case.judge(case.fit_base(1))
+    delayed = case.judge(fit(Structure(case.system, ("delay",)), case.split.fit, base.fitted.problem.floor))
+    astray = case.judge(astray_by(delayed.fitted, 0.02))
+    assert case.nearly(astray)
+
+    def right(candidate):
+        return abs(candidate.fitted.theta["mass_kg"] - delayed.fitted.theta["mass_kg"]) < 5e-4
+
+    assert not right(astray)
+    monkeypatch.setattr(search_module, "race", lambda *_, **__: [astray])
+    found = search(case, base, enough=right, workers=NOBODY)
+    assert {c.effects for c in found.tried} == {(), ("delay",)}
+    assert right(found.with_effects(["delay"]))
 
 
 def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
