@@ -28,7 +28,6 @@ from scipy.optimize import direct, shgo
 
 from benchmarks import records as lines
 from bifa import effects
-from bifa.campaign.loop import AT_EDGE
 from bifa.gait import SearchError, Settings, optimize, simulations
 from bifa.gait.library.scenarios import SCENARIOS
 from bifa.gait.objectives import NominalSpeed
@@ -48,7 +47,7 @@ def robots(count: int, models: Path | None = None) -> Iterator[tuple[str, Model,
     """Name, model and search settings of each robot."""
     if models:
         for file in sorted(models.rglob("model-last.toml")):
-            yield file.parent.relative_to(models).as_posix(), load_model(file), Settings(share=AT_EDGE, walking=True)
+            yield file.parent.relative_to(models).as_posix(), load_model(file), Settings(at_edge=True)
     names = sorted(effects.library())
     for k in range(count):
         if k < 2:

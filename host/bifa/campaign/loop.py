@@ -20,7 +20,6 @@ from bifa.data.dataset import labels_of
 from bifa.files import is_stray
 from bifa.gait import Optimum, SearchError, Settings, optimize, simulations
 from bifa.gait.library.scenarios import provenance
-from bifa.gait.objectives import QUANTILE
 from bifa.gait.uncertainty import SPREAD
 from bifa.identify.completed import completed_model
 from bifa.identify.doubts import with_doubts
@@ -37,7 +36,6 @@ from lacuna.diagnosis.next_experiment import NextExperiment
 from lacuna.diagnosis.record import as_record
 
 BENCH_NAME = "campaign: characterisation"  # name of the data set `bench`
-AT_EDGE = 0.05  # share of the robots that need not walk with a gait at the edge
 _MIN_WALK_PROBABILITY = 0.5  # gaits at the edge with a lower probability of walking are not tried
 _SEPARATING_STAGE = 10  # stage numbers of the rig: experiments that separate confusable effects count from here,
 _ROUND_STAGE = 20  # and the walks of further rounds from here
@@ -157,10 +155,8 @@ def found_gait(
     """Find the model's fastest gait with which 19 in 20 robots drawn from what is known walk (`spread` None), or the
     fastest for nine in ten with the relative `spread`. The search also starts from the baseline and from the gaits
     `walked` before."""
-    at_edge, begin = spread is None, (BASELINE, *walked)
-    share = AT_EDGE if at_edge else QUANTILE
+    settings = Settings(seed=seed, spread=spread, naive=naive, at_edge=spread is None, begin=(BASELINE, *walked))
     with simulations() as runs:
-        settings = Settings(seed=seed, spread=spread, naive=naive, share=share, walking=at_edge, begin=begin)
         return optimize(robot, runs, settings, lambda what, share, _: on_progress(what, share))
 
 

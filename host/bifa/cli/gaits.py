@@ -74,6 +74,6 @@ def _make(console: Console, model_path: Path | None, folder: Path, names: list[s
             optimum = optimize(model, runs, settings, progress(scenario.name))
             path = scenarios.save(folder, scenario, optimum, model.name)
             console.print(
-                f"{scenario.name}: {optimum.nominal_mm_s:.2f} mm/s, 10th percentile {optimum.quantile_mm_s:.2f} "
+                f"{scenario.name}: {optimum.nominal_mm_s:.2f} mm/s, 10th percentile {optimum.percentile_10_mm_s:.2f} "
                 f"({optimum.simulations} simulations): {path.name}"
             )

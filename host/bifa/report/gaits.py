@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from bifa.gait.objectives import QUANTILE
 from bifa.gait.search import Optimum
 from bifa.gait.sensitivity import Front, Scan
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
@@ -50,7 +51,7 @@ def distribution_chart(optimum: Optimum, others: Mapping[str, np.ndarray]) -> Ch
     series: list[Series] = []
     keys = []
     for (name, speeds), color in zip(shown.items(), ("after", "quiet", "before"), strict=False):
-        label = f"{name}: 10th percentile {np.quantile(speeds, 0.1):.1f} mm/s"
+        label = f"{name}: 10th percentile {np.quantile(speeds, QUANTILE):.1f} mm/s"
         style = "steps" if series else "area"
         series.append(Series((label,), bins, np.append(np.histogram(speeds, bins)[0], 0), color, style))
         keys.append(Key(label, color, style))
@@ -58,6 +59,6 @@ def distribution_chart(optimum: Optimum, others: Mapping[str, np.ndarray]) -> Ch
         series,
         Axis(f"settled speed, mm/s, {optimum.spread.text}"),
         Axis(f"robots of {optimum.speeds_mm_s.size}"),
-        [("x", optimum.quantile_mm_s, "")],
+        [("x", optimum.percentile_10_mm_s, "")],
     )
     return Chart([Column([panel])], keys, "Speeds of gaits on robots that differ from the model", height=350)

@@ -89,6 +89,23 @@ def test_bad_input_names_the_range(tmp_path, arguments, words):
     assert not (tmp_path / "gait.toml").exists()
 
 
+def test_the_edge_is_an_aim_of_its_own(runs, tmp_path, monkeypatch):
+    known = replace(nominal(), covariance=Covariance(("body_area_N_psi",), np.array([[1e-4]])))
+    save_model(tmp_path / "model.toml", known)
+    asked = []
+    monkeypatch.setattr("bifa.gait.optimize", lambda *given: asked.append(given[2]) or found)
+    found = search.optimize(nominal(), runs, Settings(robust=False, evaluations=24, seed=5))
+    found = replace(found, settings=Settings(at_edge=True))
+    given = ("--model", tmp_path / "model.toml", "--out", tmp_path / "gait.toml", "--no-pictures", "--edge")
+    assert invoke("optimize", *given).exit_code == 0
+    assert [(one.at_edge, one.robust, one.share) for one in asked] == [(True, True, 0.05)]
+    notes = tomllib.loads((tmp_path / "gait.toml").read_text())["provenance"]
+    assert notes["objective"] == "speed on the model itself, if 95 % of the robots walk"
+    refused = invoke("optimize", *given, "--nominal")
+    assert refused.exit_code == 2
+    assert "choose one of --edge and --nominal" in refused.output
+
+
 def test_a_method_that_does_not_exist_is_refused_before_anything_is_loaded(tmp_path):
     result = invoke("optimize", "--out", tmp_path / "gait.toml", "--method", "sgd")
     assert result.exit_code == 2

@@ -56,20 +56,16 @@ def provenance(optimum: Optimum, model_name: str, made_by: str) -> dict[str, Any
         "model": model_name,
         "method": settings.method,
         "seed": settings.seed,
-        "objective": f"{_percentile(settings)} of the speed" if settings.robust else "speed on the model itself",
+        "objective": settings.aim,
         "evaluations": optimum.evaluations,
         "simulations": optimum.simulations,
         "predicted_speed_mm_s": round(optimum.nominal_mm_s, 3),
-        f"predicted_{_percentile(settings).replace(' ', '_')}_mm_s": round(optimum.quantile_mm_s, 3),
+        "predicted_10th_percentile_mm_s": round(optimum.percentile_10_mm_s, 3),
         "interval_90_mm_s": [round(v, 3) for v in optimum.prediction.interval_90_mm_s],
         "walks_probability": round(optimum.prediction.walks_probability, 4),
         "cycles_to_settle": optimum.prediction.cycles,
         "uncertainty": optimum.spread.text,
     }
-
-
-def _percentile(settings: Settings) -> str:
-    return f"{100 * settings.share:g}th percentile"
 
 
 def save(folder: Path, scenario: Scenario, optimum: Optimum, model_name: str) -> Path:
