@@ -122,9 +122,7 @@ def test_a_port_that_goes_as_it_is_opened_is_gone(port, monkeypatch):
         SerialTransport(port)
 
 
-def test_a_port_that_goes_as_its_baud_rate_is_set_is_gone(port, monkeypatch):
-    """A port can vanish on any read, since pyserial sets the baud rate with every time-out."""
-
+def test_a_port_that_goes_as_it_is_read_is_gone(port, monkeypatch):
     def gone(*_: object) -> None:
         raise OSError(errno.EIO, "Input/output error")
 
