@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = ("bifa console", "bifa console --port virtual", f"echo show | bifa console --port {EXAMPLE_PORT}")
 
+_READ_AHEAD = 1000  # lines of a pipe that wait
 _LOOK_S = 0.02  # less than any useful `host_timeout_s`
 
 
@@ -55,7 +56,7 @@ def piped_lines(uno: "Uno") -> Iterator[str]:
     """Yield the pipe's lines, and keep the link to the Uno alive while the pipe is silent."""
     from bifa.measure.desk import read_lines
 
-    come: queue.Queue[str | None] = queue.Queue()
+    come: queue.Queue[str | None] = queue.Queue(_READ_AHEAD)
     threading.Thread(target=read_lines, args=(come,), daemon=True).start()
     while True:
         try:
@@ -69,12 +70,16 @@ def piped_lines(uno: "Uno") -> Iterator[str]:
 
 
 def _pipe(uno: "Uno", rig: "Rig") -> bool:
-    from bifa.link.terminal import type_line
+    from bifa.link.terminal import reports_stop, type_line
 
-    good = True
+    good, before = True, ""
     uno.session.lines.clear()  # drop the greeting: a pipe's reader expects only answers
     for line in piped_lines(uno):
         lines = type_line(uno, line, rig.clock)
         typer.echo("\n".join(lines))
         good = good and lines[-1].startswith("ok")
+        if reports_stop(lines, before, line):
+            typer.echo("error: the robot has stopped by itself; the remaining lines are not carried out", err=True)
+            return False
+        before = line
     return good

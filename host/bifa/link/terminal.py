@@ -1,5 +1,7 @@
 """Console lines over the port of a session, which carries telemetry and clock exchanges at the same time."""
 
+from collections.abc import Iterable
+
 from bifa.link.errors import NoAnswerError
 from bifa.link.transport import Clock
 from bifa.link.uno import Uno
@@ -14,6 +16,14 @@ PARAMETER_COMMANDS = ("set", "load", "defaults")  # these may change `host_timeo
 def is_answer(line: str) -> bool:
     """Whether a line ends the answer to a typed line."""
     return line.startswith(("ok", "error"))
+
+
+def reports_stop(lines: Iterable[str], *typed: str) -> bool:
+    """Whether `lines` of the Uno report a stop or a fault that the lines `typed` last do not explain. Lines that wait
+    were meant for a robot that had not stopped; a `clear` and a `run` among them would make it walk again."""
+    words = {word for line in typed for word in line.split()[:1]}
+    expected = tuple(report for word, report in (("stop", "[stopped"), ("status", "[fault")) if word in words)
+    return any(line.startswith(("[stopped", "[fault")) and not line.startswith(expected) for line in lines)
 
 
 def settle(uno: Uno, clock: Clock) -> None:

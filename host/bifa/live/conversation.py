@@ -7,7 +7,7 @@ import threading
 from bifa.link import NoAnswerError, RestartedError, Uno
 from bifa.link.errors import AbandonedError
 from bifa.link.leaving import uninterrupted
-from bifa.link.terminal import settle, type_line
+from bifa.link.terminal import reports_stop, settle, type_line
 from bifa.live.completion import Known
 from bifa.live.rounds import Latest, Pace
 from bifa.rig import Rig
@@ -28,6 +28,7 @@ class Conversation:
         self._clock = rig.clock
         self._typed: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._is_stopping = False
+        self._last_line = ""
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -40,19 +41,19 @@ class Conversation:
         """Send the real-time stop and drop all waiting lines; the thread then waits for the confirmation."""
         with contextlib.suppress(ConnectionError):  # the thread meets the same error, and ends
             self.uno.send_stop()
-        if dropped := self._drop_waiting():
-            print(f"-- not carried out: {', '.join(dropped)}")
+        self._drop_waiting()
         self._is_stopping = True
 
-    def _drop_waiting(self) -> list[str]:
-        """Remove and return the typed lines that have not begun."""
+    def _drop_waiting(self) -> None:
+        """Remove and show the typed lines that have not begun."""
         lines: list[str | None] = []
         with contextlib.suppress(queue.Empty):
             while True:
                 lines.append(self._typed.get_nowait())
         if None in lines:
             self._typed.put(None)
-        return [line for line in lines if line]
+        if dropped := ", ".join(line for line in lines if line):
+            print(f"-- not carried out: {dropped}")
 
     def leave(self) -> None:
         """Carry out what has been typed, then end."""
@@ -95,7 +96,10 @@ class Conversation:
             if lines := list(self.uno.session.lines):
                 self.uno.session.lines.clear()
                 print("\n".join(lines))
+                if reports_stop(lines, self._last_line):
+                    self._drop_waiting()
         except RestartedError:
+            self._drop_waiting()
             self.uno.connect()
             settle(self.uno, self._clock)
             self._start_telemetry()
@@ -103,14 +107,18 @@ class Conversation:
         return line is not None
 
     def _carry_out(self, line: str) -> None:
+        before, self._last_line = self._last_line, line
         try:
             lines = type_line(self.uno, line, self._clock)
+            is_over = reports_stop(lines, before, line)
         except NoAnswerError as error:
-            lines = [f"-- {error}"]
+            lines, is_over = [f"-- {error}"], True
         try:
             self._update_known()  # first, so that completion is up to date when the answer appears
         finally:
             print("\n".join(lines))
+            if is_over:
+                self._drop_waiting()
 
     def _start_telemetry(self) -> None:
         self._update_known()

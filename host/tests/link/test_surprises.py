@@ -176,6 +176,20 @@ def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(uno):
     assert done.output.replace("\n", "").isprintable()
 
 
+def test_a_pipe_is_not_carried_out_after_a_stop_that_it_did_not_ask_for(uno):
+    uno.on_heard = lambda data: uno.board.write(frames.STOP) if b"save one" in data else None
+    done = CliRunner().invoke(app, ["console", "--port", uno.device], input="save one\nclear\nrun\nshow period_s\n")
+    assert done.exit_code == 1
+    assert done.output.splitlines() == [
+        "[stopped: all valves off until clear", "ok",
+        "error: the robot has stopped by itself; the remaining lines are not carried out"]  # fmt: skip
+    assert uno.driven_s == 0.0
+    uno.on_heard = lambda data: None
+    done = CliRunner().invoke(app, ["console", "--port", uno.device], input="clear\nrun\nstop\nclear\nshow period_s\n")
+    assert done.exit_code == 0, done.output
+    assert "period_s 5.7" in done.output
+
+
 @pytest.mark.parametrize("ask", [Uno.status, Uno.parameters, Uno.presets, Uno.exchange_clocks])
 def test_an_answer_of_another_kind_is_none(connected, ask):
     """A request whose answers are all of another kind is repeated and then reported as unanswered."""

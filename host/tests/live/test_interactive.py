@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from bifa.link import Counters, Sample
+from bifa.link.frames import STOP
 from bifa.live.completion import Known, words_after
 from bifa.live.interactive import status_lines
 from harness.terminal import Terminal
@@ -110,6 +111,29 @@ def test_a_stop_acts_as_it_is_pressed_also_while_the_uno_erases(console, uno):
     enters(console, "clear", "ok")
 
 
+def pastes(console: Terminal, *lines: str) -> None:
+    console.presses("\x1b[200~" + "\n".join(lines) + "\x1b[201~" + ENTER)
+
+
+@pytest.mark.parametrize(
+    ("happens", "says"),
+    [
+        (lambda board: board.write(STOP), "[stopped: all valves off until clear"),
+        (lambda board: board.reset(), "-- the Uno restarted, all valves off"),
+    ],
+    ids=["emergency stop", "restart"],
+)
+def test_lines_that_wait_are_not_carried_out_after_a_stop_that_nobody_typed(console, uno, happens, says):
+    uno.on_heard = lambda data: happens(uno.board) if b"save one" in data else None
+    pastes(console, "save one", "clear", "run")
+    console.sees(says, "-- not carried out: clear, run")
+    uno.wait(0.5)
+    assert uno.driven_s == 0.0
+    enters(console, "clear", "ok")
+    pastes(console, "run", "stop", "clear", "show period_s")
+    console.sees(f"[period_s 5.7 {PERIOD}")
+
+
 def close_window(console: Terminal) -> None:
     console.program.ptyproc.delayafterclose = 3  # before pexpect kills it
     console.program.close(force=False)
@@ -190,7 +214,7 @@ def test_an_open_console_keeps_host_timeout_s_from_venting_and_its_end_does_not(
 
 
 def test_several_lines_pasted_are_answered_in_order(console):
-    console.presses("\x1b[200~set period_s 3\nshow period_s\nset duty_body 2\x1b[201~" + ENTER)
+    pastes(console, "set period_s 3", "show period_s", "set duty_body 2")
     console.sees(f"[period_s 3 {PERIOD} * power-up 5.7 s", "error out of range; duty_body is 0 to 1")
 
 
