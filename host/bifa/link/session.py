@@ -218,8 +218,9 @@ class Session:
         may have been carried out. After a call that was interrupted or not answered, the next call opens a new session.
         """
         if self._is_calling:  # what that call left in flight must not answer this one, nor be carried out later
-            nonce = self.hello.boot_nonce if self.hello else None
-            if self.connect(timeout_s).boot_nonce != nonce:
+            known = self.hello
+            if self.connect(timeout_s).boot_nonce != (known.boot_nonce if known else None):
+                self.hello, self._is_calling = known, True  # every call says so, until its owner connects again
                 raise RestartedError("the Uno restarted; connect again and repeat")
             self.on_renewed()
         self._is_calling = True

@@ -15,6 +15,7 @@ from bifa.link.table import (
     DEAD_TIME_MS,
     FAULT_UNITS,
     FAULTS,
+    PRESETS,
     SAMPLE_PERIOD_MS,
     SCHEDULE_ENTRIES,
     SESSION_TIMEOUT_MS,
@@ -210,8 +211,13 @@ class Uno:
 
         A walking robot adopts the new set at the next cycle boundary; with `wait`, the call returns only then. `save`
         also keeps the set as a preset of that name. Raises UnoParameterError before anything is sent if a value is out
-        of range, and LinkError if the Uno ends up with other values than those sent.
+        of range or the name is not one that can be saved, and LinkError if the Uno ends up with other values than those
+        sent.
         """
+        if save is not None:
+            _name_field(save)
+            if save in PRESETS:
+                raise UnoParameterError(f"{save} is a factory preset; save it under another name")
         wanted = {name: to_wire(name, value) for name, value in parameters.items()}
         wanted = {**self._read_set()[0], **wanted}
         fields = [("field", (index_of(name), value)) for name, value in wanted.items()]

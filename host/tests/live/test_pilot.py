@@ -10,7 +10,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from bifa.link import PortGoneError, StillMovingError, Uno, frames
+from bifa.link import PortGoneError, RefusedError, StillMovingError, Uno, frames
 from bifa.live.conversation import Conversation
 from bifa.live.web.pilot import BusyError, NotConnectedError, Pilot
 from harness.board import Board
@@ -51,6 +51,19 @@ def test_what_is_asked_is_done_and_answered():
     during, asked = once(lambda pilot: pilot.ask(lambda uno: uno.get("period_s")))
     flown(during)
     assert asked[0].result(0) == pytest.approx(5.7)
+
+
+def test_pages_show_what_the_robot_has_also_if_only_part_of_a_change_was_carried_out():
+    def fill(uno):
+        for number in range(8):
+            uno.save(f"preset{number}")
+
+    during, asked = once(lambda pilot: pilot.ask(lambda uno: uno.upload({"period_s": 3.0}, save="ninth"), changes=True))
+    _, reports, _ = flown(during, 2.0, fill)
+    with pytest.raises(RefusedError):
+        asked[0].result(0)
+    assert reports[0]["parameters"]["period_s"] == 5.7
+    assert reports[-1]["parameters"]["period_s"] == 3.0
 
 
 def test_reports_show_pressures_valves_and_phases():

@@ -260,6 +260,10 @@ class _Flight:
             if not self._pilot.is_watched():
                 raise
         except BifaError as error:  # refused: the requester gets the error
+            if request.changes:  # perhaps in part: a set that is not saved as a preset has been sent before
+                with contextlib.suppress(BifaError):
+                    self._read_settings()
+                    self._tell_now()
             request.future.set_exception(error)
         except BaseException as error:
             request.future.set_exception(NotConnectedError(str(error) or "bifa monitor has ended"))
