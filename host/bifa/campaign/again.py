@@ -144,9 +144,10 @@ def judged(model: Model, walks: Dataset, at_edge: bool = False) -> Round:
 
 
 def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
-    """Measured minus predicted positions in mm of the tracked ends, shape (repeats, ends, samples), on the time base of
-    the shortest repeat."""
-    places = [name for name in repeats[0].columns if name.startswith("displacement")]
+    """Measured minus predicted positions in mm of the ends tracked in every repeat, shape (repeats, ends, samples), on
+    the time base of the shortest repeat."""
+    tracked = set.intersection(*(set(trial.columns) for trial in repeats))
+    places = sorted(name for name in tracked if name.startswith("displacement"))
     shortest = min(repeats, key=lambda trial: trial.time_s[-1])
     columns = predict(model, shortest)
     predicted = np.array([columns[place] for place in places])

@@ -25,7 +25,7 @@ from bifa.identify.completed import completed_model
 from bifa.identify.doubts import with_doubts
 from bifa.identify.identification import identify
 from bifa.identify.refit import refitted
-from bifa.identify.start import prepare
+from bifa.identify.start import before_fit, prepare
 from bifa.measure import plan
 from bifa.measure.session import run_session
 from bifa.report.words import spoken
@@ -193,7 +193,7 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
         found = diagnosed(dataset)
-        (outputs / "separating").mkdir()
+        (outputs / "separating").mkdir(exist_ok=True)
         ran: tuple[NextExperiment, ...] = ()
         if not setup.is_by_hand:
             rigs, folder = (lambda n: setup.open(_SEPARATING_STAGE + n)), outputs / "separating"
@@ -206,9 +206,10 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
         save_model(outputs / "model-completed.toml", completed_model(found.told))
 
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
-    settings = setup.settings(_SEPARATING_STAGE)
+    settings = setup.settings(_SEPARATING_STAGE) | {"search_seed": setup.seed}
     measures = not (setup.is_virtual or setup.is_by_hand)  # the separating experiments, on an unattended rig
-    return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings, by_hand=measures)
+    title = "find what the model lacks"
+    return Stage("diagnose", title, ("bench",), makes, run, settings, resumes=measures, by_hand=measures)
 
 
 def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: OnProgress) -> Stage:
@@ -216,7 +217,9 @@ def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: 
         known = refitted(dataset, model, setup.seed, lambda what: on_progress(spoken(what), 0.0))
         if known:
             return known
-        return completed_model(_run_diagnosis(setup, on_progress, dataset, tuple(model.effects), model.base).told)
+        return completed_model(
+            _run_diagnosis(setup, on_progress, dataset, tuple(model.effects), before_fit(model)).told
+        )
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
@@ -234,7 +237,7 @@ def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: 
     walked = ("walks-base", "walks-completed")
     needs = ("bench", "separating", *walked, "model-completed.toml", "gait-completed.toml")
     makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
-    settings = setup.settings(_ROUND_STAGE) | {"effort": asdict(effort)}
+    settings = setup.settings(_ROUND_STAGE) | {"effort": asdict(effort), "search_seed": setup.seed}
     kept = not setup.is_virtual
     return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=kept, by_hand=kept)
 

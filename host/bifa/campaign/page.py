@@ -36,8 +36,8 @@ GAIT_NAMES = {
     "completed": "found with the completed model",
 }
 ERROR_COLUMNS = ("base model", "completed model", "noise floor")
-_STAND_IN = "baseline: the {} model has none"
 _NAMES = GAIT_NAMES | {"edge": "at the edge of what is known"}
+_STAND_INS = {"baseline": "baseline", "base": "the base model's"}
 FILES = (
     ("bench/dataset.toml", "data set"),
     ("diagnosis.json", "verdict"),
@@ -90,17 +90,25 @@ def campaign_page(
 
 
 def _speed_sentences(gaits: Sequence[Mapping[str, Any]]) -> str:
-    measured = {gait["gait"]: gait["measured"] for gait in gaits}
-    fastest = max(("completed", *(["edge"] if "edge" in measured else [])), key=lambda name: measured[name])
-    times = measured[fastest] / measured["baseline"] if measured["baseline"] > 0 else float("inf")
+    by_name = {gait["gait"]: gait for gait in gaits}
+    base, baseline_mm_s = by_name["base"], by_name["baseline"]["measured"]
+    fastest = max((by_name[name] for name in ("completed", "edge") if name in by_name), key=lambda one: one["measured"])
+    if fastest.get("stand_in"):
+        return "With the completed model, no gait was found with which enough robots walk."
+    compared = "while the baseline stands still"
+    if baseline_mm_s >= STANDING_MM_S:
+        compared = f"{fastest['measured'] / baseline_mm_s:.1f} times as fast as the baseline"
     return (
-        f"The gait found with the completed model walks {measured[fastest]:.1f} mm/s, "
-        f"{times:.1f} times as fast as the baseline. {_gain_sentence(measured['base'], measured[fastest])}"
+        f"The gait found with the completed model walks {fastest['measured']:.1f} mm/s, {compared}. "
+        f"{_gain_sentence(base, fastest['measured'])}"
     )
 
 
-def _gain_sentence(base_mm_s: float, completed_mm_s: float) -> str:
+def _gain_sentence(base: Mapping[str, Any], completed_mm_s: float) -> str:
     """What completing the model gained on this robot."""
+    base_mm_s = base["measured"]
+    if base.get("stand_in"):
+        return "With the base model, no gait was found."
     if base_mm_s < STANDING_MM_S:
         return "With the gait found with the base model the robot stands still."
     gain = 100.0 * (completed_mm_s / base_mm_s - 1.0)
@@ -236,7 +244,8 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
         "A model is judged by its prediction of a gait that was not fitted. Round 1 walks the gait found with the "
         "completed model for robots whose parameters differ by 2 %; later gaits are sought for what is known of this "
         "robot, and so are nearer the edge beyond which it does not walk. Between rounds the walks are added to the "
-        "data, the diagnosis is repeated with all data, and the next round walks the gait of the resulting model.",
+        "data, the model is fitted to all of them, and diagnosed again if that leaves something that matters; the next "
+        "round walks the gait of the resulting model.",
         *(
             f"Round {number}: the model includes {' and '.join(map(effect_words, one['effects'])) or 'no effect'}; "
             f"its gait is {gait_words(one['gait'])}."
@@ -247,11 +256,16 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
     return ChartedSection("Gaits that were not fitted", said, [PageTable(columns, rows, caption)])
 
 
+def _gait_name(gait: Mapping[str, Any]) -> str:
+    stand_in = gait.get("stand_in")
+    return f"{_STAND_INS[stand_in]}: the {gait['gait']} model has none" if stand_in else _NAMES[gait["gait"]]
+
+
 def speed_table(gaits: Sequence[Mapping[str, Any]]) -> PageTable:
     """Table of the predicted and measured speeds of the gaits."""
     rows = [
         [
-            _STAND_IN.format(gait["gait"]) if gait.get("stand_in") else _NAMES[gait["gait"]],
+            _gait_name(gait),
             f"{gait['base_model']:.2f}",
             f"{gait['completed_model']:.2f} {_interval(gait)}",
             f"{gait['measured']:.2f}{NBSP}±{NBSP}{gait['spread']:.2f}",

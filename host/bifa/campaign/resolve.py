@@ -31,7 +31,8 @@ def resolve(
     """As long as `found` names an experiment that separates the effects it confuses, run it and diagnose again, up to
     `ROUNDS` times. This ends when one explanation is left or no available experiment separates them.
 
-    open_rig(n) opens the rig for experiment n, counted from 1; its data set goes to `folder`/separate-n.
+    open_rig(n) opens the rig for experiment n, counted from 1; its data set goes to `folder`/separate-n. One that is
+    there, from a run that was interrupted, is not measured again.
     diagnose(dataset, suspected): `suspected` are the effects named before and those they were confused with. Returns
     all trials as one data set, the last diagnosis, and the experiments that were run.
     """
@@ -39,19 +40,20 @@ def resolve(
     for number in range(1, ROUNDS + 1):
         if found.next.experiment is None:
             break
-        trials = planned(found.next)
-        with open_rig(number) as rig:
-            run_session(
-                rig,
-                folder / f"separate-{number}",
-                trials,
-                name=f"to tell {' and '.join(found.next.separates)} apart",
-                known=dataset.known,
-                provenance=dataset.provenance,
-                record=record,
-                on_event=lambda e: on_progress(e.planned.title, (e.number - 1 + e.share) / e.total),
-            )
-        dataset = joined(dataset, read_dataset(folder / f"separate-{number}"), f"separate-{number}_")
+        target = folder / f"separate-{number}"
+        if not target.exists():
+            with open_rig(number) as rig:
+                run_session(
+                    rig,
+                    target,
+                    planned(found.next),
+                    name=f"to tell {' and '.join(found.next.separates)} apart",
+                    known=dataset.known,
+                    provenance=dataset.provenance,
+                    record=record,
+                    on_event=lambda e: on_progress(e.planned.title, (e.number - 1 + e.share) / e.total),
+                )
+        dataset = joined(dataset, read_dataset(target), f"{target.name}_")
         ran.append(found.next)
         found = diagnose(dataset, {*found.next.separates, *(effect.name for effect in found.effects)})
     return dataset, found, tuple(ran)

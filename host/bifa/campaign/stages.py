@@ -239,9 +239,7 @@ def _resumed(scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, 
 
 def trials_in(scratch: Path) -> int:
     """Number of trials that an interrupted stage left in its scratch folder."""
-    from bifa.data.write import PARTIAL_SUFFIX  # imports numpy, which usage errors need not wait for
-
-    return len(list(scratch.glob(f"**/*{PARTIAL_SUFFIX}/*.csv")))
+    return len(list(scratch.glob("**/*.csv")))
 
 
 def _leftover_digests(folder: Path, scratch: Path, stage: Stage, begun: Mapping[str, Any]) -> dict[str, str]:

@@ -27,6 +27,7 @@ from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.robot import Model, load_model
 from bifa.robot.gait import BASELINE, Gait, load_gait
 from bifa.simulate import gait_rows
+from bifa.toml import parse_toml
 
 TITLES = {"baseline": "baseline gait"} | {which: f"gait {GAIT_NAMES[which]}" for which in ("base", "completed")}
 _ROBOTS = 256
@@ -38,7 +39,7 @@ def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stag
 
     robot: in words; made: how the campaign was made, for the report."""
     needs = ["bench", "model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "rounds.json"]
-    needs += ["gait-base.toml", "rounds"]
+    needs += ["gait-base.toml", "gait-completed.toml", "rounds"]
     needs += ["diagnosis.json", "errors.json", "residuals.json", *(["truth.json"] if sealed else [])]
     makes = ("summary.json", "walks.png", "errors.png", "walk.svg", "report.html")
     return Stage("compare", "compare and report", tuple(needs), makes, partial(_run, robot, made))
@@ -52,7 +53,10 @@ def _run(robot: str, made: Sequence[tuple[str, str]], inputs: Path, outputs: Pat
         "base": walks_of(load_gait(inputs / "gait-base.toml"), datasets["base"]),
         "completed": datasets["completed"].trials,
     }
-    results = [_result(name, trials, base, _predicted(completed, trials[0])) for name, trials in walked.items()]
+    results = [
+        _result(name, trials, base, _predicted(completed, trials[0]), _stand_in(inputs / f"gait-{name}.toml"))
+        for name, trials in walked.items()
+    ]
     rounds = read_rounds(inputs / "rounds.json")
     if number := fastest_at_edge(rounds):
         fastest = read_dataset(inputs / "rounds" / f"walks-{number}")
@@ -98,10 +102,19 @@ def _predicted(model: Model, trial: Trial) -> dict[str, Any]:
     }
 
 
-def _result(gait: str, trials: Sequence[Trial], base: Model, predicted: Mapping[str, Any]) -> dict[str, Any]:
+def _stand_in(file: Path) -> str | None:
+    """Whose gait the file of a model's gait holds if none walks on that model: "baseline" or "base"; otherwise None."""
+    if not file.exists() or "instead_of" not in parse_toml(file.read_text("utf-8")).get("provenance", {}):
+        return None
+    return "baseline" if load_gait(file) == BASELINE else "base"
+
+
+def _result(
+    gait: str, trials: Sequence[Trial], base: Model, predicted: Mapping[str, Any], stand_in: str | None = None
+) -> dict[str, Any]:
     """Speeds in mm/s over the settled cycles of a gait. spread: standard deviation of the repeats. settled_cycles:
     number measured in all. completed_model, interval_90_mm_s, walks_probability: as `predicted` by the completed model,
-    at the edge by the model that sought the gait. stand_in: the baseline was walked because no gait walks on the model.
+    at the edge by the model that sought the gait. stand_in: the gait walked instead if none walks on the model.
     """
     measured, trial = [speed_of(one) for one in trials], trials[0]
     means = [speed.mean_mm_s for speed in measured]
@@ -112,7 +125,7 @@ def _result(gait: str, trials: Sequence[Trial], base: Model, predicted: Mapping[
         "measured": float(np.mean(means)),
         "spread": float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
         "paper": PAPER_MM_S[gait],
-        "stand_in": gait != "baseline" and trial.gait == BASELINE.as_dict(),
+        "stand_in": stand_in,
         "settled_cycles": sum(speed.settled_cycles for speed in measured),
         "interval_90_mm_s": predicted["interval_90_mm_s"],
         "walks_probability": predicted["walks_probability"],

@@ -114,6 +114,8 @@ def diagnose(
         def report_progress(what: str, share: float = 0.0) -> None:
             progress.update(task, description=spoken(what))
 
+        latest: list[tuple[Dataset, Diagnosis]] = []  # the trials, and what they say
+
         def run_diagnosis(trials: Dataset, confusable: Collection[str] = ()) -> Diagnosis:
             system = prepare(trials, robot)
             system.accuracies = good_enough
@@ -121,7 +123,8 @@ def diagnose(
             found = engine.diagnose(
                 system, seed=seed, suspected=suspected, on_progress=report_progress, executor=executor
             )
-            return with_doubts(found, system)
+            latest[:] = [(trials, with_doubts(found, system))]
+            return latest[0][1]
 
         with workers as (executor, _):
             found = run_diagnosis(measured)
@@ -129,14 +132,12 @@ def diagnose(
                 rigs = partial(_opened, measured, port, progress)
                 with stoppable(lambda: _kept(resolved)):
                     try:
-                        measured, found, _ = further.resolve(
-                            measured, found, run_diagnosis, rigs, resolved, report_progress, hands
-                        )
+                        further.resolve(measured, found, run_diagnosis, rigs, resolved, report_progress, hands)
                     except BaseException:  # whatever happened to the rig, report what the data say
                         progress.stop()
-                        _report(console, measured, found, json, out, report)
+                        _report(console, *latest[0], json, out, report)
                         raise
-    _report(console, measured, found, json, out, report)
+    _report(console, *latest[0], json, out, report)
 
 
 def _kept(resolved: Path) -> str:

@@ -245,9 +245,10 @@ def optimize(
     if settings.robust and explored.best_value > 0.0:
         explored = explore_on_robots(search, explored)
     if explored.best_value <= 0.0:
-        raise SearchError(
-            f"none of {len(explored.values)} gaits walks without slipping; widen the space or search longer"
-        )
+        none = f"none of {len(explored.values)} gaits walks"
+        if settings.robust:
+            raise SearchError(f"{none} on enough of the drawn robots; narrow their spread, or widen the space")
+        raise SearchError(f"{none} without slipping; widen the space or search longer")
     if settings.robust:
         refined = _refine_on_robots(search, explored) if settings.refine else []
         gait, nominal = best_of_finalists(search, explored, [explored, *refined][-1])

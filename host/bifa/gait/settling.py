@@ -56,10 +56,14 @@ def _is_level(advance_mm: np.ndarray, noise_mm: float) -> bool:
         return False
     mean, half = float(advance_mm.mean()), len(advance_mm) // 2
     allowed = WITHIN * max(abs(mean), 1.0)
-    # A cycle is the difference of two positions; the mean over half a walk is such a difference over `half` cycles.
+    # A cycle is the difference of two positions; the mean over half a walk is such a difference over `half` cycles. If
+    # the number of cycles is even, the halves share the position in the middle, which then counts twice.
+    shared = np.sqrt(6.0 if len(advance_mm) % 2 == 0 else 4.0)
     off = np.abs(advance_mm - mean).max()
     trend = abs(advance_mm[-half:].mean() - advance_mm[:half].mean())
-    return off <= allowed + _N_SIGMA * np.sqrt(2.0) * noise_mm and trend <= allowed + _N_SIGMA * 2.0 * noise_mm / half
+    return (
+        off <= allowed + _N_SIGMA * np.sqrt(2.0) * noise_mm and trend <= allowed + _N_SIGMA * shared * noise_mm / half
+    )
 
 
 def walking(found: Settling, mean_mm_s: float) -> Walking:

@@ -10,6 +10,7 @@ from bifa.problem.system import CURVE_OF, RobotSystem
 from lacuna.check.numbers import fast_noise
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.estimation.fit import Fit
+from lacuna.estimation.noise import least_sd
 
 _MAX_REPEAT_RATIO = 5.0  # differences between repeats, over the fast noise; healthy: below 3, if noise is colored
 
@@ -41,7 +42,8 @@ def repeats_apart(fit: Fit) -> Iterator[str]:
         if not noise.repeats or not trials:
             continue
         fast = float(np.median([fast_noise(t.time_s, t.channels[channel]) for t in trials]))
-        ratio = noise.sd / max(fast, fit.structure.system.sensor_noise(experiment, channel))
+        least = max(fit.structure.system.sensor_noise(experiment, channel), least_sd(trials, channel))
+        ratio = noise.sd / max(fast, least)  # rounded readings may lie on a line
         if ratio > _MAX_REPEAT_RATIO:
             yield (
                 f"Repeats of {experiment} differ by {noise.sd:.2g} {channel.rpartition('_')[2]} in {channel}, "

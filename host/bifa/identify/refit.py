@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from bifa.data import Dataset
 from bifa.identify.completed import completed_model
-from bifa.identify.start import prepare
+from bifa.identify.start import before_fit, prepare
 from bifa.problem.system import RobotSystem
 from bifa.robot import Model
 from lacuna.diagnosis.refit import refit
@@ -17,7 +17,7 @@ def refitted(
     something that matters, or has learnt curves: the data then call for a diagnosis."""
     if model.learnt:
         return None
-    system = prepare(dataset, model.base)
+    system = prepare(dataset, before_fit(model))
     fit = refit(system, tuple(model.effects), values_of(system, model), seed=seed, on_progress=on_progress)
     return completed_model(fit) if fit else None
 

@@ -48,14 +48,16 @@ def session_drifts(fit: Fit) -> dict[str, float]:
 
 
 def switch_timing(system: RobotSystem) -> Scatter:
-    """The Uno's timekeeping, means over the walks: near the edge, 0.25 % of the period or a few milliseconds decide."""
+    """The Uno's timekeeping, means over the walks that note it: near the edge, 0.25 % of the period or a few
+    milliseconds decide."""
     walks = [trial for trial in system.dataset.trials if trial.experiment == WALK]
-    if not walks:
-        return Scatter()
-    clock = float(np.mean([seconds_per_uno_s(trial) for trial in walks]))
-    dead_time_s = float(np.mean([trial.extra.get("dead_time_s", 0.0) for trial in walks]))
-    tick_s = max(trial.extra.get("tick_s", 0.0) for trial in walks)  # not noted is unknown, not another tick
-    return Scatter(clock=round(clock, 6), dead_time_s=round(dead_time_s, 6), tick_s=tick_s)
+    clocks = [seconds_per_uno_s(trial) for trial in walks if "clock_rate" in trial.extra]
+    dead_times_s = [trial.extra["dead_time_s"] for trial in walks if "dead_time_s" in trial.extra]
+    return Scatter(
+        clock=round(float(np.mean(clocks or [1.0])), 6),
+        dead_time_s=round(float(np.mean(dead_times_s or [0.0])), 6),
+        tick_s=max((trial.extra.get("tick_s", 0.0) for trial in walks), default=0.0),
+    )
 
 
 def _between_runs(fit: Fit) -> float:

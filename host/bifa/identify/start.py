@@ -16,6 +16,7 @@ from bifa.problem.curves import FittedCurve
 from bifa.problem.stiffness import UndeterminedError
 from bifa.problem.switches import step_timeline
 from bifa.problem.system import CURVE_OF, RobotSystem, fittable
+from bifa.problem.unmeasured import PRIOR_SD
 from bifa.robot import Model, ModelParameterError
 from lacuna.estimation.solve import one_thread
 
@@ -50,6 +51,12 @@ def prepare(
     if not system.parameters:
         raise UndeterminedError("these trials constrain no unknown parameter of the model")
     return system
+
+
+def before_fit(model: Model) -> Model:
+    """The base model of a fitted one, with nominal values of the parameters that have priors: what a fit found is no
+    prior for another fit to the same trials."""
+    return model.base.with_values({name: robot.nominal()[name] for name in PRIOR_SD})
 
 
 def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:

@@ -159,7 +159,7 @@ def _from_pairs(
     if still.sum() < 20:
         still = known
     sd = np.sqrt(np.mean(everything[still] ** 2))
-    least = max(sensor, _min_sd([trial for pair in pairs for trial in pair], channel))
+    least = max(sensor, least_sd([trial for pair in pairs for trial in pair], channel))
     records = [(first.time_s, _smooth(first.channels[channel])) for first, _ in pairs]
     constant = ChannelNoise(float(max(sd, least)), 0.0, 1.0, len(pairs))
     growing = _growing(constant, np.concatenate([samples for _, samples in records])[known], everything[known], least)
@@ -210,7 +210,7 @@ def _of_fast_noise(
     """Floor without repeats or a declared correlation time, from the fast noise of `basis`: residuals, or the records
     themselves, which give an upper bound, since a record may itself vary fast."""
     sd = float(np.median([fast_noise(trial.time_s, basis[trial.name][channel]) for trial in members]))
-    return ChannelNoise(max(sd, sensor, _min_sd(members, channel)), 0.0, 1.0, 0)
+    return ChannelNoise(max(sd, sensor, least_sd(members, channel)), 0.0, 1.0, 0)
 
 
 def _of_correlated(
@@ -228,7 +228,7 @@ def _of_correlated(
     if not np.isfinite(np.concatenate(changes)).any():  # samples are further apart than that: their noise is white
         return _of_fast_noise(members, channel, sensor, basis)
     sd = float(1.4826 * np.nanmedian(np.abs(np.concatenate(changes))))
-    return ChannelNoise(max(sd, sensor, _min_sd(members, channel)), 0.0, float(np.median(pieces)), 0)
+    return ChannelNoise(max(sd, sensor, least_sd(members, channel)), 0.0, float(np.median(pieces)), 0)
 
 
 def _difference(first: Record, second: Record, channel: str, basis: Mapping[str, Channels]) -> np.ndarray:
@@ -297,7 +297,7 @@ def _smooth(samples: np.ndarray) -> np.ndarray:
     return median_filter(samples, size=3, mode="nearest")
 
 
-def _min_sd(trials: Sequence[Record], channel: str) -> float:
+def least_sd(trials: Sequence[Record], channel: str) -> float:
     """Lower bound of a floor: rounding, and 1e-4 of the channel's spread, so that no weight is infinite."""
     spread = max(float(np.nanstd(trial.channels[channel])) for trial in trials)
     rounded = max(_rounding_step(trial.channels[channel]) for trial in trials)

@@ -203,6 +203,15 @@ def test_it_ends_with_as_many_rounds_as_there_may_be():
     assert [ending(rounds[:count]) for count in (1, 2, 3)] == [None, None, Ending.MOST]
 
 
+def test_an_end_that_was_not_tracked_in_every_repeat_is_left_out():
+    walks = walked({"completed": FAST})
+    first, *others = walks.trials
+    headless = {name: values for name, values in first.columns.items() if name != "displacement_tail_mm"}
+    partly = replace(walks, trials=(replace(first, columns=headless), *others))
+    assert judged(ROBOT, partly).error_mm == pytest.approx(judged(ROBOT, walks).error_mm, rel=0.2)
+    assert "displacement_tail_mm" in first.columns
+
+
 def test_one_repeat_has_no_floor():
     walks = walked({"completed": FAST})
     alone = judged(ROBOT, Dataset(None, "walks", {}, walks.trials[:1], {}))

@@ -1,14 +1,16 @@
 """Effects that a diagnosis could not tell apart are measured and diagnosed again, on the real firmware."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from bifa.campaign.resolve import ROUNDS, joined, planned, resolve
 from bifa.cli import app
-from bifa.data import Dataset
+from bifa.data import Dataset, write_dataset
 from bifa.measure.plan import PlannedTrial
 from bifa.rig import RigError, open_rig
 from bifa.robot.gait import BASELINE
@@ -21,6 +23,8 @@ SEPARATING = NextExperiment(
     gain=12.0,
 )
 DAY = Dataset(None, "day", {}, ())
+TIME_S = np.arange(0.0, 1.0, 0.01)
+PULL = {"time_s": TIME_S, "displacement_mm": 30.0 * TIME_S, "force_N": 0.1 * TIME_S, "pressure_psi": 0.0 * TIME_S}
 
 
 def test_settings_become_trials_with_their_repeats():
@@ -58,6 +62,17 @@ def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
     assert dataset.trials[0].columns["displacement_mm"].max() > 25.0
 
 
+def test_an_experiment_that_an_interrupted_run_has_measured_is_not_measured_again(tmp_path):
+    trials = tuple(replace(p.as_trial(session_order=k + 1), columns=PULL) for k, p in enumerate(planned(SEPARATING)))
+    write_dataset(tmp_path / "separate-1", Dataset(None, "to tell them apart", {}, trials))
+    rigs = Mock(side_effect=AssertionError("the rig is not needed"))
+    resolved = SimpleNamespace(next=NextExperiment(), effects=())
+    dataset, found, ran = resolve(
+        DAY, SimpleNamespace(next=SEPARATING, effects=()), lambda *_: resolved, rigs, tmp_path
+    )
+    assert (len(dataset.trials), found, ran) == (3, resolved, (SEPARATING,))
+
+
 @pytest.fixture
 def diagnosing(monkeypatch, tmp_path):
     """Run `bifa diagnose` on an empty day: its exception, and a list of what was diagnosed and reported."""
@@ -87,6 +102,19 @@ def test_the_verdict_is_told_where_the_rig_fails_after_it(diagnosing, monkeypatc
     assert isinstance(result.exception, RigError)
     assert done == ["diagnosed", "the verdict"]
     assert (tmp_path / "verdict.json").read_text() == '"the verdict"\n'
+
+
+def test_the_verdict_after_the_first_experiment_is_told_where_the_second_fails(diagnosing, monkeypatch):
+    def fails_later(dataset, found, diagnose, *_):
+        diagnose(replace(DAY, name="with one more"), ())
+        raise RigError("gone")
+
+    monkeypatch.setattr("bifa.campaign.resolve.resolve", fails_later)
+    told = []
+    monkeypatch.setattr("bifa.cli.diagnose._report", lambda console, measured, *_: told.append(measured.name))
+    result, done = diagnosing("--resolve", "--port", "virtual")
+    assert isinstance(result.exception, RigError)
+    assert (done, told) == (["diagnosed"] * 2, ["with one more"])
 
 
 @pytest.mark.parametrize(

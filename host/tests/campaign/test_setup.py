@@ -25,6 +25,18 @@ def answering(*lines):
     return Mock(**{"answer.side_effect": lines})
 
 
+def test_another_search_seed_is_not_mixed_with_what_is_there():
+    """On a real robot too: diagnosis and searches depend on it, though the data do not."""
+
+    def settings(seed):
+        stages = campaign(Setup("/dev/ttyACM7", seed=seed), Effort(), lambda what, share: None)
+        return {stage.name: stage.settings for stage in stages}
+
+    first, other = settings(0), settings(5)
+    differing = {name for name in first if first[name] != other[name]}
+    assert differing == {"optimise-base", "diagnose", "optimise-completed", "again"}
+
+
 def test_known_values_are_asked_once_and_kept(tmp_path):
     path = tmp_path / "bench.toml"
     desk = answering("0.182", "", "9 bar", "8.4", "")

@@ -30,6 +30,14 @@ def test_the_cameras_noise_does_not_unsettle_a_walk():
     assert late > 190  # without knowing the noise
 
 
+@pytest.mark.parametrize("cycles", [4, 5])
+def test_noise_alone_hardly_ever_unsettles_a_walk_with_an_even_number_of_cycles_either(cycles):
+    """Of an even number of cycles both halves share the position in the middle: their difference varies by more."""
+    places = 1.0 * np.arange(cycles + 1) + 0.1 * np.random.default_rng(1).standard_normal((40_000, cycles + 1))
+    trends = sum(settling(advance, 0.1).begins > 0 for advance in np.diff(places))
+    assert trends < 120, "1 in 2,000 by the trend and by each cycle, of 40,000"
+
+
 def test_what_drifts_or_alternates_does_not_settle():
     assert not settling(np.linspace(60.0, 50.0, 20), 0.1).is_settled
     assert not settling(np.array([30.0, 70.0] * 8), 0.1).is_settled

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from bifa.data import Dataset, Trial
+from bifa.identify.doubts import repeats_apart
 from bifa.identify.scatter import sd_of_few, session_drifts, shared_square, switch_timing
 from bifa.robot import BASELINE, nominal
 from bifa.robot.model import Scatter
-from lacuna.system import Correction
+from lacuna.estimation.noise import ChannelNoise
+from lacuna.system import Correction, Record
 
 
 def test_noise_averages_out_of_what_repeats_share():
@@ -27,7 +29,26 @@ def test_the_scatter_says_how_the_uno_keeps_time():
     noted = {"clock_rate": 1.004, "dead_time_s": 0.004, "tick_s": 0.001}
     trials = (first, replace(first, repeat=2, extra=noted))
     timing = switch_timing(SimpleNamespace(dataset=Dataset(None, "day", {}, trials)))
-    assert timing == Scatter(clock=0.99701, dead_time_s=0.002, tick_s=0.001)
+    assert timing == Scatter(clock=0.99701, dead_time_s=0.004, tick_s=0.001), "not noted is unknown, not 0"
+    unknown = switch_timing(SimpleNamespace(dataset=Dataset(None, "day", {}, (replace(first, extra={}),))))
+    assert unknown == switch_timing(SimpleNamespace(dataset=Dataset(None, "day", {}, ()))) == Scatter()
+
+
+def test_repeats_apart_are_compared_with_rounding_too():
+    """Most readings rounded to 0.1 mm equal their neighbors, which looks like no noise at all."""
+    time_s = np.arange(0.0, 2.0, 0.01)
+    risen = 20.0 * (1.0 - np.exp(-time_s / 0.1))
+    repeats = [
+        Record(f"run {k}", "step_response", "step", time_s, {"displacement_mm": np.round(risen + 0.05 * k, 1)})
+        for k in range(3)
+    ]
+    noise = ChannelNoise(0.03, 0.0, 1.0, 3)
+    floor = SimpleNamespace(channels={("step_response", "displacement_mm"): noise})
+    structure = SimpleNamespace(system=SimpleNamespace(sensor_noise=lambda *_: 0.0))
+    fit = SimpleNamespace(problem=SimpleNamespace(floor=floor, trials=repeats), structure=structure)
+    assert not list(repeats_apart(fit))
+    floor.channels["step_response", "displacement_mm"] = replace(noise, sd=1.0)
+    assert "differ by 1 mm in displacement_mm, 35 times" in next(repeats_apart(fit))
 
 
 def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():

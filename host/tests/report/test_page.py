@@ -205,8 +205,10 @@ def test_the_terminal_says_a_diagnosis_in_words_within_80_columns():
 
 def test_a_baseline_in_the_place_of_a_gait_is_called_so():
     gait = {**sample.summary()["gaits"][0], "gait": "base"}
-    found, stands_in = (row[0] for row in speed_table([gait, gait | {"stand_in": True}]).rows)
+    found, stands_in = (row[0] for row in speed_table([gait, gait | {"stand_in": "baseline"}]).rows)
     assert (found, stands_in) == ("found with the base model", "baseline: the base model has none")
+    other = gait | {"gait": "completed", "stand_in": "base"}
+    assert speed_table([other]).rows[0][0] == "the base model's: the completed model has none"
 
 
 VACUUM = "vacuum in 0.50 (body), 0.50 (head) and 0.50 (tail) of the cycle"
