@@ -7,7 +7,7 @@ import typer
 
 from bifa.cli._options import PORT, requires
 from bifa.computer import EXAMPLE_PORT
-from bifa.screen import Console
+from bifa.screen import Console, warning
 
 EXAMPLES = (
     "bifa upload gait.toml",
@@ -42,7 +42,7 @@ def upload(
 
     from bifa.link import Uno
     from bifa.link.leaving import valves_at
-    from bifa.live.walk import walk
+    from bifa.live.walk import UNSUPPLIED, walk
     from bifa.rig import open_rig
     from bifa.robot.gait import read_gait_file
 
@@ -52,10 +52,12 @@ def upload(
         try:
             with console.status("waiting for the Uno") as shown, Uno(rig.transport, rig.clock) as uno:
                 hello = uno.connect()
-                uno.upload(parameters, save=save)
+                uploaded = uno.upload(parameters, save=save)
                 done = ", ".join(["read back equal", *(["saved as " + save] if save else [])])
                 console.print(f"{gait.name} is on the Uno (firmware {hello.firmware}): {done}")
                 if run:
+                    if uploaded["pressure_psi"] == 0.0:
+                        console.print(warning(UNSUPPLIED))
                     console.print("walking; Ctrl-C ends" if seconds is None else f"walking for {seconds:g} s")
                     walk(uno, rig.clock, seconds, shown.update)
         except KeyboardInterrupt as interrupt:

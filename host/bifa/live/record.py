@@ -20,7 +20,7 @@ from bifa.link import RefusedError, Sample, Uno
 from bifa.link.leaving import raise_if_unconfirmed
 from bifa.link.table import MARK_PAUSE
 from bifa.live.rounds import Absence
-from bifa.live.walk import raise_if_no_reader, stopped_text
+from bifa.live.walk import UNSUPPLIED, raise_if_no_reader, stopped_text
 from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.printable import counted
@@ -139,8 +139,8 @@ class _TelemetryLog:
                 uno = Uno(rig.transport, rig.clock)
                 with uno:
                     is_back, known = self._nonce is not None, self._greet(uno)
-                    if self._parameters:
-                        uno.upload(self._parameters)
+                    if self._parameters and uno.upload(self._parameters)["pressure_psi"] == 0.0:
+                        self._console.print(warning(UNSUPPLIED))
                     uno.clock_relation.estimate(0.0)  # its first use imports for longer than `host_timeout_s` may be
                     uno.stream(True)
                     marked = uno.mark_strobe()

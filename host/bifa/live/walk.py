@@ -12,6 +12,7 @@ from bifa.live.rounds import Pace
 from bifa.ranges import CHAMBERS
 
 LOOK_EVERY_S = 0.5
+UNSUPPLIED = "the set-point is 0 psi: the valves switch, but the robot does not walk (`set pressure_psi 8.5`)"
 
 
 def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable[[str], None]) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import bifa
 from bifa.check.lag import trial_misfit
 from bifa.data import Dataset, DatasetError, DatasetWriter, Trial
+from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.session import Counters
 from bifa.lock import locked
@@ -70,7 +71,8 @@ def run_session(
             if writer.trials:
                 rig.resume(len(writer.trials))
             uno.clear()
-            for number, planned in enumerate(trials, start=1):
+            supplied = _at_own_pressure(trials, uno.get("pressure_psi"))
+            for number, planned in enumerate(supplied, start=1):
                 if writer.has(planned.as_trial()):
                     continue
                 before, event = replace(uno.counters), Event(planned, number, len(trials))
@@ -84,6 +86,21 @@ def run_session(
                 link, misfit = uno.counters.since(before), trial_misfit(trial, writer.trials[:-1])
                 on_event(replace(event, share=1.0, trial=trial, link=link, misfit=misfit))
         return writer.finish()
+
+
+def _at_own_pressure(trials: Sequence[PlannedTrial], own_psi: float) -> list[PlannedTrial]:
+    """The trials, with walks that plan no pressure at the Uno's own, whatever a trial before them has set. Raises
+    BifaError if there are walks at 0 psi, which some start presets have for safety."""
+    supplied = [
+        replace(trial, parameters={"pressure_psi": own_psi, **trial.parameters}) if trial.gait is not None else trial
+        for trial in trials
+    ]
+    if any(trial.parameters.get("pressure_psi") == 0.0 for trial in supplied):
+        raise BifaError(
+            "the set-point is 0 psi, with which nothing walks: set it in `bifa console` (`set pressure_psi 8.5`, then "
+            "`save`), or with `pressure_psi` in the gait file"
+        )
+    return supplied
 
 
 def _refuse_same_names(trials: Sequence[PlannedTrial]) -> None:

@@ -350,6 +350,9 @@ def test_upload_and_console_on_the_virtual_robot(tmp_path):
     done = invoke("upload", path, "--port", "virtual", "--save", "fast", "--run", "--seconds", 1)
     assert done.exit_code == 0, done.output
     assert "read back equal, saved as fast walking for 1 s valves off" in " ".join(done.output.split())
+    path.write_text("pressure_psi = 0.0\n" + path.read_text())
+    done = invoke("upload", path, "--port", "virtual", "--run", "--seconds", 0.2)
+    assert "warning the set-point is 0 psi" in " ".join(done.output.split())
     done = invoke("console", "--port", "virtual", input="show period_s\nset period_s 4\nshow period_s\n")
     period = "s (0.5 to 60 s, default 5.7 s)"
     assert done.output.splitlines() == [

@@ -47,6 +47,27 @@ def recorded(tmp_path_factory):
         return read_dataset(folder), dict(rig.truth)
 
 
+def set_pressure(rig, psi):
+    with Uno(rig.transport, rig.clock) as uno:
+        uno.connect()
+        uno.set("pressure_psi", psi)
+
+
+@pytest.mark.uno
+def test_walks_are_walked_at_the_unos_own_pressure_whatever_was_measured_before(tmp_path):
+    with open_rig("virtual", seed=5) as rig:
+        set_pressure(rig, 6.0)
+        day = run(rig, tmp_path / "day", [PULL, WALK])
+        assert PULL.pressure_psi != 6.0
+        assert [trial.extra["set_point_psi"] for trial in day.trials] == pytest.approx(
+            [PULL.pressure_psi, 6.0], abs=0.1
+        )
+        set_pressure(rig, 0.0)
+        with pytest.raises(BifaError, match="the set-point is 0 psi, with which nothing walks"):
+            run(rig, tmp_path / "another", [PULL, WALK])
+        assert not (tmp_path / "another").exists()
+
+
 @pytest.mark.uno
 def test_every_experiment_is_recorded_as_the_format_wants_it(recorded):
     dataset, _ = recorded
