@@ -24,7 +24,7 @@ _MIN_GAIN = 1.0  # log-likelihood: after a round that gains less, derivatives fr
 # Squared change of the residuals over the expected one. Below: the step was too short, and its derivative is mostly
 # error. Above: it met a jump (a foot that slips a sample sooner).
 _CHANGE_RATIOS = (0.5, 4.0)
-_FALL = 100.0  # the same of a single trial: far over a cliff (a robot that falls), where there is no derivative
+_FALL = 100.0  # squared change of a single trial: over a cliff (a robot that falls), or a derivative that was too small
 _MAX_STEP_SCALES = 1.0  # scales: longest step of a derivative, in directions that the data leave open
 
 
@@ -102,9 +102,9 @@ def _is_as_predicted(along: _Directions, before: np.ndarray, after: np.ndarray) 
 
 
 def _derivatives(problem: Problem, solution: Solution, along: _Directions) -> list[Sensitivity]:
-    """Derivatives of each trial (free parameters, its nuisances), from differences along the directions. In a direction
-    in which a trial falls off a cliff, its earlier derivative holds: a single fall would otherwise pass for information
-    on every parameter."""
+    """Derivatives of each trial (free parameters, its nuisances), from differences along the directions. A change too
+    large for one is taken from half the step, beyond which there may be a cliff. If most of it is there, too, the cliff
+    is nearer and the trial's earlier derivative holds: a fall would pass for information on every parameter."""
     point, free = solution.point, solution.free
     values = np.tile(point.values, (len(free), 1))
     values[:, list(free)] += along.structure.T
@@ -114,10 +114,17 @@ def _derivatives(problem: Problem, solution: Solution, along: _Directions) -> li
         nuisances, follow, spread = point.nuisances[i], along.following[i], along.spread[i]
         both = zip(values, nuisances + follow.T, strict=True)
         alone = ((point.values, nuisances + step) for step in np.diag(spread))
-        changes = problem.changes(i, (point.values, nuisances), [*both, *alone])
+        here, places = (point.values, nuisances), [*both, *alone]
+        changes = problem.changes(i, here, places)
         steps = np.block([[along.structure.T, follow.T], [np.zeros((len(spread), len(free))), np.diag(spread)]])
-        for k in np.flatnonzero((changes**2).sum(axis=1) > _FALL):
-            changes[k] = solution.sensitivities[i].times(steps[k])
+        size = (changes**2).sum(axis=1)
+        large = np.flatnonzero(size > _FALL)
+        halfway = [tuple(0.5 * (a + b) for a, b in zip(here, places[k], strict=True)) for k in large]
+        for k, half in zip(large, problem.changes(i, here, halfway) if halfway else (), strict=True):
+            if (half**2).sum() <= _FALL:
+                changes[k] = 2.0 * half
+            elif (half**2).sum() > 0.5 * size[k]:  # of a slope, a quarter
+                changes[k] = solution.sensitivities[i].times(steps[k])
         own = changes[len(free) :] / spread[:, None]
         taken = np.vstack([back.T @ (changes[: len(free)] - follow.T @ own), own])
         return Sensitivity.of(taken, range(len(taken)), len(free), len(nuisances))

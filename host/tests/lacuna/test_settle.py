@@ -38,6 +38,7 @@ class Lines(System):
 
     name = "lines"
     effects: ClassVar = {}
+    error = ERROR
 
     def __init__(self, runs: int, upper: float = 10.0, seed: int = 0, factor_of: tuple[str, ...] = ()):
         random, self.factor_of, self.trials = np.random.default_rng(seed), factor_of, ()
@@ -50,7 +51,7 @@ class Lines(System):
     def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
         slopes, factor = [theta[name] for name in TRUTH], theta["factor"]
         wrong = np.sin(np.array([*slopes, factor]) @ _ERROR_DIRECTION + _ERROR_PHASE)
-        return {"y_m": factor * (columns() @ slopes) + ERROR * wrong}
+        return {"y_m": factor * (columns() @ slopes) + self.error * wrong}
 
     def nuisances(self, trial):
         return (Parameter("factor", "", 1.0, 0.5, 1.5, scale=FRICTION_SD, factor_of=self.factor_of),)
@@ -145,6 +146,30 @@ def test_a_trial_that_falls_within_a_step_does_not_pass_for_information():
         settled = settle(replace(rough, problem=Problem(Structure(system), system.trials, FLOOR)))
         assert settled.cost <= rough.cost
         assert stated_sd(settled) == pytest.approx(expected_sd(4), rel=0.3)  # a quarter of it is of rough derivatives
+
+
+class Exact(Lines):
+    error = 0.0
+
+
+class AllButFlat(Exact):
+    """Lines on which `bent` acts with 2 % of its strength within a third of its standard deviation from `at`."""
+
+    at = TRUTH["bent"]
+
+    def predict(self, theta, effects, trial, **how):
+        flat, off = 0.3 * expected_sd(4)[1], theta["bent"] - self.at
+        near = np.clip(off, -flat, flat)
+        return super().predict({**theta, "bent": self.at + off - 0.98 * near}, effects, trial, **how)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_derivative_that_was_far_too_small_is_not_taken_for_a_fall(seed):
+    system = AllButFlat(runs=4, seed=seed)
+    system.at = fitted(Exact(runs=4, seed=seed)).theta["bent"]
+    rough = fitted(system)
+    assert stated_sd(rough)[1] > 5.0 * expected_sd(4)[1]
+    assert stated_sd(settle(rough)) == pytest.approx(expected_sd(4), rel=1.0)
 
 
 def test_derivatives_by_a_factor_are_those_of_what_it_multiplies():
