@@ -28,7 +28,6 @@ from lacuna.system import (
     System,
     Theta,
     middle_conditions,
-    no_prediction,
     several,
 )
 from lacuna.values import Values
@@ -297,47 +296,7 @@ class FunctionSystem(System):
         coarse: bool = False,
         corrections: Sequence[Correction] = (),
     ) -> Channels:
-        try:
-            return self.run(trial, self.values(theta, corrections))
-        except (ArithmeticError, np.linalg.LinAlgError):  # the parameters are too extreme to simulate
-            return no_prediction(trial)
-
-    def predict_trials(
-        self,
-        thetas: Sequence[Theta],
-        effects: tuple[str, ...],
-        trials: Sequence[Record],
-        *,
-        coarse: bool = False,
-        corrections: Sequence[Sequence[Correction]] = (),
-        alike: bool = False,
-    ) -> list[Channels]:
-        """As `predict`, but a failed simulation does not stop the search: if the model raises a ValueError or returns
-        an output whose shape differs from the measured one, the prediction is NaN. Raises MisuseError, naming trial and
-        values, for any other error of the model."""
-        corrections = corrections or [()] * len(thetas)
-        return [self._predict_or_nan(*one, effects) for one in zip(thetas, trials, corrections, strict=True)]
-
-    def _predict_or_nan(
-        self, theta: Theta, trial: Record, corrections: Sequence[Correction], effects: tuple[str, ...]
-    ) -> Channels:
-        try:
-            found = self.predict(theta, effects, trial, corrections=corrections)
-        except ValueError:
-            return no_prediction(trial)
-        except LacunaError:
-            raise
-        except Exception as error:
-            at = ", ".join(f"{name} = {self.told(name, value):.6g}" for name, value in theta.items())
-            raise MisuseError(
-                f"trial {trial.name}: the model raises {type(error).__name__}: {error} at {at}. Return NaN where it"
-                " cannot be simulated."
-            ) from error
-        alike = all(
-            name in found and found[name].shape == column.shape and found[name].dtype.kind in "fiu"
-            for name, column in trial.channels.items()
-        )
-        return found if alike else no_prediction(trial)
+        return self.run(trial, self.values(theta, corrections))
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         given = self._nuisances

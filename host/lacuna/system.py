@@ -18,7 +18,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from lacuna.errors import DeclarationError
+from lacuna.errors import DeclarationError, LacunaError, MisuseError
 
 Theta = Mapping[str, float]
 Channels = dict[str, np.ndarray]
@@ -230,6 +230,24 @@ def no_prediction(trial: Record) -> Channels:
     return {name: np.full(column.shape, np.nan) for name, column in trial.channels.items()}
 
 
+def misshapen(found: Channels, trial: Record) -> str:
+    """What is wrong with the form of a prediction of a trial, naming the channel; empty if nothing is. Raises
+    MisuseError if a channel is missing, which no value of a parameter excuses."""
+    if not isinstance(found, Mapping):
+        raise MisuseError(f"trial {trial.name}: the model returns {type(found).__name__}, not channels by name.")
+    for name, measured in trial.channels.items():
+        if name not in found:
+            there = ", ".join(map(str, found)) or "nothing"
+            raise MisuseError(f"trial {trial.name}, channel {name}: not predicted; the model returns {there}.")
+        column = found[name]
+        if not isinstance(column, np.ndarray) or column.dtype.kind not in "fiu":
+            kind = f"array of {column.dtype}" if isinstance(column, np.ndarray) else type(column).__name__
+            return f"channel {name}: predicted as {kind}, not as an array of real numbers"
+        if column.shape != np.shape(measured):
+            return f"channel {name}: predicted with shape {column.shape}, measured with {np.shape(measured)}"
+    return ""
+
+
 def groups_of_repeats(trials: Sequence[Record]) -> list[list[Record]]:
     """Group trials by experiment and condition, in order of first appearance."""
     groups: dict[Hashable, list[Record]] = {}
@@ -360,12 +378,39 @@ class System(Protocol):
         """Predict each of `trials` with the corresponding one of `thetas`. Override it, and set `at_once`, if
         simulating several trials of one experiment side by side is cheaper, or one trial with several `thetas`.
         `alike`: all `thetas` are close to the first and will be compared with it, as for derivatives, so integrator
-        errors should cancel as far as possible."""
+        errors should cancel as far as possible. A failed simulation does not stop the search: if `predict` raises a
+        ValueError or an ArithmeticError, or returns a channel whose shape differs from the measured one, the prediction
+        is NaN. Raises MisuseError, as `attempt` does."""
         corrections = corrections or [()] * len(thetas)
-        return [
-            self.predict(theta, effects, trial, coarse=coarse, corrections=learnt)
-            for theta, trial, learnt in zip(thetas, trials, corrections, strict=True)
-        ]
+        found = []
+        for theta, trial, learnt in zip(thetas, trials, corrections, strict=True):
+            one = self.attempt(theta, effects, trial, coarse=coarse, corrections=learnt)
+            found.append(no_prediction(trial) if isinstance(one, str) or misshapen(one, trial) else one)
+        return found
+
+    def attempt(
+        self,
+        theta: Theta,
+        effects: tuple[str, ...],
+        trial: Record,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Correction] = (),
+    ) -> Channels | str:
+        """Predict a trial, or say why it cannot be simulated with these values: the ValueError or ArithmeticError that
+        `predict` raises. Raises MisuseError, naming trial and values, for any other error of the model."""
+        try:
+            return self.predict(theta, effects, trial, coarse=coarse, corrections=corrections)
+        except LacunaError:
+            raise
+        except (ValueError, ArithmeticError) as error:
+            return f"{type(error).__name__}: {error}"
+        except Exception as error:
+            at = ", ".join(f"{name} = {self.told(name, value):.6g}" for name, value in theta.items())
+            raise MisuseError(
+                f"trial {trial.name}: the model raises {type(error).__name__}: {error} at {at}. Return NaN where it"
+                " cannot be simulated."
+            ) from error
 
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
         """Quantities on which a residual may depend, by name, each of shape (n,): "displacement", "direction of

@@ -9,7 +9,7 @@ from lacuna.check.given import gaps_in_inputs
 from lacuna.check.numbers import SAME, changed, differ, spread
 from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.records import Stretch
-from lacuna.system import Channels, Record, System, Theta
+from lacuna.system import Channels, Record, System, Theta, misshapen, no_prediction
 
 _MAX_CHANGE = 1e-3  # of a channel's spread, RMS: largest permitted change by an effect at its absent size
 _MAX_CHANGE_ELSEWHERE = 0.03  # the same for an effect of typical size in an experiment outside its `experiments`
@@ -69,23 +69,15 @@ def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Rec
         found = system.predict(theta, effects, trial)
     except LacunaError:
         raise
+    except (ArithmeticError, np.linalg.LinAlgError):  # the values are too extreme to simulate
+        return no_prediction(trial)
     except Exception as error:
         raise MisuseError(
             f"trial {trial.name}, channel {listed(list(trial.channels))}: the model{with_effects} raises"
             f" {type(error).__name__}: {error}"
         ) from error
-    if not isinstance(found, Mapping):
-        raise MisuseError(f"trial {trial.name}: the model returns {type(found).__name__}, not channels by name.")
-    for name, measured in trial.channels.items():
-        where = f"trial {trial.name}, channel {name}{with_effects}"
-        if name not in found:
-            raise MisuseError(f"{where}: not predicted; the model returns {', '.join(map(str, found)) or 'nothing'}.")
-        column = found[name]
-        if not isinstance(column, np.ndarray) or column.dtype.kind not in "fiu":
-            kind = f"array of {column.dtype}" if isinstance(column, np.ndarray) else type(column).__name__
-            raise MisuseError(f"{where}: predicted as {kind}, not as an array of real numbers.")
-        if column.shape != np.shape(measured):
-            raise MisuseError(f"{where}: predicted with shape {column.shape}, measured with {np.shape(measured)}.")
+    if fault := misshapen(found, trial):
+        raise MisuseError(f"trial {trial.name}, {fault}{with_effects}.")
     return {name: np.array(found[name], float) for name in trial.channels}
 
 

@@ -90,6 +90,24 @@ def test_refuses_a_prediction_of(found, said):
         diagnose(system, on_progress=pytest.fail)  # before the search begins
 
 
+def predicting(found):
+    """What a search gets of a system whose `predict` returns `found()`."""
+    system = Line(predict=lambda theta, effects, trial, **how: found())
+    return system.predict_trials([{"slope": 2.0}], (), [TRIALS[0]])[0]["y"]
+
+
+@pytest.mark.parametrize("found", [lambda: math.sqrt(-1.0), lambda: 1.0 / math.sin(0.0), lambda: {"y": T[1:]}])
+def test_a_search_goes_on_where_a_system_of_ones_own_fails(found):
+    assert np.isnan(predicting(found)).all()
+
+
+def test_a_search_says_where_a_system_of_ones_own_breaks():
+    with pytest.raises(MisuseError, match=r"trial run 0: the model raises IndexError: .* at slope = 2"):
+        predicting(lambda: [][0])
+    with pytest.raises(MisuseError, match="trial run 0, channel y: not predicted; the model returns x"):
+        predicting(lambda: {"x": T})
+
+
 REFUSED = {
     "run 0: time does not increase from sample 49": changed(time_s=np.where(T == 0.5, 0.2, T)),
     r"run 0: time does not increase from sample 2 \(2 s\)": changed(
