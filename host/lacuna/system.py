@@ -404,7 +404,7 @@ class System(Protocol):
         except LacunaError:
             raise
         except (ValueError, ArithmeticError) as error:
-            return f"{type(error).__name__}: {error}"
+            return f"{type(error).__name__}: {error}".strip()
         except Exception as error:
             at = ", ".join(f"{name} = {self.told(name, value):.6g}" for name, value in theta.items())
             raise MisuseError(

@@ -1,6 +1,6 @@
 """Checks of models that cannot be fitted, by what they return, raise, ignore or remember."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +9,7 @@ from lacuna.check.given import gaps_in_inputs
 from lacuna.check.numbers import SAME, changed, differ, spread
 from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.records import Stretch
-from lacuna.system import Channels, Record, System, Theta, misshapen, no_prediction
+from lacuna.system import Channels, Effect, Record, System, Theta, misshapen, no_prediction
 
 _MAX_CHANGE = 1e-3  # of a channel's spread, RMS: largest permitted change by an effect at its absent size
 _MAX_CHANGE_ELSEWHERE = 0.03  # the same for an effect of typical size in an experiment outside its `experiments`
@@ -61,9 +61,14 @@ def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Cha
     return {t.name: predictions[t.name] for t in good}, tuple(warnings)
 
 
+def _expected(system: System, trial: Record) -> dict[str, float]:
+    """Expected values of a trial's nuisances."""
+    return {p.name: p.value for p in system.nuisances(trial)}
+
+
 def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
     """A prediction of a trial at its nuisances' expected values, checked. Raises MisuseError."""
-    theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
+    theta = dict(theta) | _expected(system, trial)
     with_effects = f" with effect {effects[0]}" if effects else ""
     try:
         found = system.predict(theta, effects, trial)
@@ -83,7 +88,7 @@ def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Rec
 
 def _check_free_run(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
     """Raise MisuseError if late samples of a channel, which give no initial state, change its prediction."""
-    theta = dict(start) | {p.name: p.value for p in system.nuisances(trial)}
+    theta = dict(start) | _expected(system, trial)
     for name, measured in trial.channels.items():
         (found,) = system.predict_trials([theta], (), [_measured_otherwise(trial, name)])
         if differ(found[name], predictions[trial.name][name], SAME * spread(measured)):
@@ -105,7 +110,7 @@ def _measured_otherwise(trial: Record, name: str) -> Record:
 
 def _check_effects(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> None:
     """Raise MisuseError if an effect at its absent size changes the base model's prediction, or at its typical size
-    changes it noticeably in an experiment outside its `experiments`."""
+    changes it noticeably in an experiment outside its `experiments`, or if no fit with it could start."""
     firsts = {t.experiment: t for t in reversed(trials)}
     for name, effect in system.effects.items():
         off = effect.typical | dict.fromkeys(effect.size_names, effect.absent)
@@ -120,6 +125,50 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
                 raise MisuseError(
                     f"trial {trial.name}, channel {channel}: effect {name} changes the prediction although {why}"
                 )
+        _check_start_sizes(system, start, effect, [t for t in trials if effect.shows_in(t)])
+
+
+def _check_start_sizes(system: System, start: Theta, effect: Effect, seen: Sequence[Record]) -> None:
+    """Raise MisuseError if an effect can be simulated in no trial at any of the sizes at which fits start: the search
+    would say that it does not help. One trial is simulated, unless all sizes fail in it."""
+    sizes, first = _start_sizes(effect, effect.start_factors), ""
+    for trial in seen:
+        causes = [_failure(system, {**start, **effect.typical, **size}, effect, trial) for size in sizes]
+        if not all(causes):
+            return
+        first = first or f"trial {trial.name}: {causes[0]}"
+    if first:
+        tried = ("; ".join(f"{n} = {system.told(n, v):.4g}" for n, v in size.items()) for size in sizes)
+        raise MisuseError(
+            f"effect {effect.name} cannot be simulated at any of the sizes at which fits start"
+            f" ({listed(tried, len(sizes))}): {first}. Correct the model, or declare another typical size."
+        )
+
+
+def _failure(system: System, theta: Theta, effect: Effect, trial: Record) -> str:
+    """Why a trial cannot be simulated at all with an effect; empty if it can. Raises MisuseError for a prediction of
+    the wrong shape: a slip, not a value that is too extreme."""
+    found = system.attempt({**theta, **_expected(system, trial)}, (effect.name,), trial)
+    if isinstance(found, str):
+        return found
+    if fault := misshapen(found, trial):
+        raise MisuseError(f"trial {trial.name}, {fault}, with effect {effect.name}.")
+    known = any((np.isfinite(found[c]) & np.isfinite(measured)).any() for c, measured in trial.channels.items())
+    return "" if known else "the prediction is NaN"
+
+
+def _start_sizes(effect: Effect, factors: Iterable[float]) -> list[dict[str, float]]:
+    """Sizes of an effect at these multiples of its typical ones, of either sign where its bounds allow."""
+    sized = effect.parameters[: effect.sizes]
+    signs = (1.0, -1.0) if all(p.lower < effect.absent < p.upper for p in sized) else (1.0,)
+    return [
+        {
+            effect.full_name(p): min(max(effect.absent + sign * by * (p.value - effect.absent), p.lower), p.upper)
+            for p in sized
+        }
+        for sign in signs
+        for by in factors
+    ]
 
 
 def _never_off(system: System) -> list[str]:
@@ -143,13 +192,7 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
     """A warning of the effects that change no prediction at any of the sizes at which fits start, if there are any."""
     unused = []
     for name, effect in system.effects.items():
-        sizes = [
-            {
-                effect.full_name(p): min(max(effect.absent + by * (p.value - effect.absent), p.lower), p.upper)
-                for p in effect.parameters[: effect.sizes]
-            }
-            for by in (1.0, *effect.start_factors)
-        ]
+        sizes = _start_sizes(effect, (1.0, *effect.start_factors))
         seen = (t for t in trials if effect.shows_in(t))
         if not any(
             changed(
@@ -171,7 +214,7 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
 
 def predict_unchecked(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
     """A prediction as the search makes it, at values that may be extreme; a failed one (NaN) counts as a change."""
-    theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
+    theta = dict(theta) | _expected(system, trial)
     return system.predict_trials([theta], effects, [trial])[0]
 
 

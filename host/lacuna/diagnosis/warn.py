@@ -8,7 +8,7 @@ from lacuna.diagnosis.decide import Choice
 from lacuna.diagnosis.nuisances import Followed, NuisanceOfRun, runs_of
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import Error, Floor, failed, with_residuals
-from lacuna.diagnosis.score import score
+from lacuna.diagnosis.score import Promise, score
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.errors import listed
@@ -189,14 +189,22 @@ def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
         and e.sizes == 1
         and e.absent in (e.parameters[0].lower, e.parameters[0].upper)
     ]
-    for one in score(fitted, able, Workers(lambda _: None)).screened() if able else ():
-        if one.wrong_sign > policy.share:
+    scores = score(fitted, able, Workers(lambda _: None)) if able else None
+    smallest = {secant.effect: secant for secant in reversed(scores.secants)} if scores else {}
+    for one in scores.screened() if scores else ():
+        if one.wrong_sign > policy.share and not _fails(smallest[one.effect]):
             effect = system.effects[one.effect]
             size = effect.parameters[0]
             told, typical = (system.told(effect.full_name(size), value) for value in (effect.absent, size.value))
             side, bound = "below" if told < typical else "above", f"{told:g} {size.unit}".rstrip()
             found.append(f"{one.effect} would fit with a {size.name} {side} {bound}, which its bounds forbid.")
     return found
+
+
+def _fails(begun: Promise) -> bool:
+    """Whether the model cannot predict some trial where a fit with an effect begins, so that its score says nothing."""
+    problem = begun.problem
+    return bool(failed(zip(problem.trials, problem.scaled(problem.predict_all(begun.start)), strict=True)))
 
 
 def _bound(fitted: Fit, at: Estimate) -> float:

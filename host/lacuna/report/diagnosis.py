@@ -7,7 +7,14 @@ from typing import Any
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.report.figures import draw_errors, draw_held_out, draw_learnt, draw_tried, draw_weights
 from lacuna.report.page import Page, PageTable, Section, both_palettes
-from lacuna.report.sentence import next_in_words, number_in_words, own_form, share_in_words, verdict_sentence
+from lacuna.report.sentence import (
+    next_in_words,
+    number_in_words,
+    own_form,
+    share_in_words,
+    shares_in_words,
+    verdict_sentence,
+)
 from lacuna.report.text import floor_sentence, pairs_in_words
 from lacuna.system import by_channel
 
@@ -67,7 +74,8 @@ def _held_out(found: Diagnosis) -> Section:
 def _rejected(record: Mapping[str, Any]) -> list[Section]:
     if not record["nearest"]:
         return []
-    rows = [(_words(" + ".join(r["effects"])), share_in_words(r["share_of_gap"])) for r in record["nearest"]]
+    near = record["nearest"]
+    rows = [(_words(" + ".join(r["effects"])), share) for r, share in zip(near, shares_in_words(near), strict=True)]
     table = PageTable(("explanation", "would close"), rows)
     tried = both_palettes(partial(draw_tried, record), "what each explanation leaves")
     why = (

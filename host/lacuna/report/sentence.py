@@ -15,6 +15,14 @@ def share_in_words(share: float | None) -> str:
     return "no gap was measured" if share is None else f"{100 * min(share, 1.0):.0f} % of the gap"
 
 
+def shares_in_words(nearest: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Format the share of the gap that each of the `nearest` explanations would close. If some have none
+    and others do, there is a gap, and the former cannot predict the records on which it is measured."""
+    shares = [one["share_of_gap"] for one in nearest]
+    known = any(share is not None for share in shares)
+    return ["could not be simulated" if share is None and known else share_in_words(share) for share in shares]
+
+
 def number_in_words(value: float | None, digits: str = ".4g") -> str:
     """Format a number; a dash if it does not exist."""
     return "-" if value is None else format(value, digits)

@@ -5,7 +5,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
-from lacuna.report.sentence import next_in_words, number_in_words, own_form, share_in_words, verdict_sentence
+from lacuna.report.sentence import (
+    next_in_words,
+    number_in_words,
+    own_form,
+    share_in_words,
+    shares_in_words,
+    verdict_sentence,
+)
 
 _WIDTH, _LINES = 100, 40
 _WARNINGS, _TRIED = 6, 4
@@ -81,10 +88,11 @@ def _more(record: Mapping[str, Any], effects: Sequence[str]) -> Iterator[str]:
         one = "a learnt curve" if len(curves) == 1 else "learnt curves"
         yield f"In the errors after and in the completed model: {one}, {added}."
     near = record["nearest"][:_TRIED] if record["verdict"] != "none" else []
-    if near and near[0]["share_of_gap"] is None:
+    if all(one["share_of_gap"] is None for one in near) and near:
         yield f"Also tried: {', '.join(' + '.join(r['effects']) for r in near)}."
     elif near:
-        each = (f"{' + '.join(r['effects'])} ({share_in_words(r['share_of_gap'])})" for r in near)
+        pairs = zip(near, shares_in_words(near), strict=True)
+        each = (f"{' + '.join(r['effects'])} ({share})" for r, share in pairs)
         yield f"Also tried, with what each would close: {', '.join(each)}."
     if hidden := record["not_detectable_here"]:
         yield f"These data would hardly show: {', '.join(hidden)}."

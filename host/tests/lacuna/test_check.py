@@ -9,11 +9,16 @@ import heater
 import numpy as np
 import pytest
 from heater import said_of
+from toy import case_of
 
 import lacuna
+from lacuna.check import check
 from lacuna.diagnosis.diagnose import diagnose
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.warn import impossible_signs
 from lacuna.errors import DeclarationError, MisuseError, TooLittleDataError
 from lacuna.records import RecordError
+from lacuna.report.sentence import shares_in_words
 from lacuna.run import with_records
 from lacuna.system import CandidateExperiment, CorrectionSite, Effect, Parameter, Record, System
 
@@ -106,6 +111,59 @@ def test_a_search_says_where_a_system_of_ones_own_breaks():
         predicting(lambda: [][0])
     with pytest.raises(MisuseError, match="trial run 0, channel y: not predicted; the model returns x"):
         predicting(lambda: {"x": T})
+
+
+def with_bend(found):
+    """A line whose prediction is `found()` where its bend has a size."""
+    straight = Line()
+
+    def predict(theta, effects, trial, **how):
+        return found() if theta.get("bend.by") else straight.predict(theta, effects, trial)
+
+    return Line(predict=predict)
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (lambda: math.sqrt(-1.0), r"effect bend cannot be simulated .*\(bend.by = 0.05, .*run 0: ValueError: "),
+        (lambda: {"y": T * np.nan}, "effect bend cannot be simulated at any .*run 0: the prediction is NaN"),
+        (lambda: {"y": T[1:]}, r"run 0, channel y: predicted with shape \(100,\), .* with effect bend"),
+        (lambda: {"x": T}, "run 0, channel y: not predicted; the model returns x"),
+    ],
+)
+def test_refuses_an_effect_whose_code_always_fails(found, said):
+    with pytest.raises(MisuseError, match=said):
+        diagnose(with_bend(found), on_progress=pytest.fail)
+
+
+def test_an_effect_may_fail_at_some_of_its_sizes():
+    def predict(theta, effects, trial, **how):
+        if theta.get("bend.by", 0.0) > 0.1:
+            raise ValueError("too bent")
+        return {"y": (1 + trial.condition) * theta["slope"] * T + theta.get("bend.by", 0.0) * T**2}
+
+    assert check(Line(predict=predict)) == ()
+
+
+def test_an_effect_that_fails_is_not_said_to_fit_with_the_opposite_sign():
+    def said(lifted):
+        def predict(theta, effects, trial, **how):
+            return {"y": theta["slope"] * T + (lifted if theta.get("bend.by") else 0.0)}
+
+        low = [replace(t, channels={"y": T - 0.5 + 0.01 * DRAW.standard_normal(101)}) for t in TRIALS]
+        lift = {"bend": Effect("bend", replace(BEND, lower=0.0))}
+        base = case_of(Line(predict=predict, trials=low, effects=lift)).fit_base(1)
+        return impossible_signs(base, POLICY)
+
+    assert "bend would fit with a by below 0" in said(0.1)[0]
+    assert said(np.nan) == []
+
+
+def test_an_explanation_that_fails_on_the_test_records_is_said_to_fail():
+    tried = [{"share_of_gap": 0.8}, {"share_of_gap": None}]
+    assert shares_in_words(tried) == ["80 % of the gap", "could not be simulated"]
+    assert shares_in_words(tried[1:]) == ["no gap was measured"]
 
 
 REFUSED = {
