@@ -69,7 +69,6 @@ def _expected(system: System, trial: Record) -> dict[str, float]:
 def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
     """A prediction of a trial at its nuisances' expected values, checked. Raises MisuseError."""
     theta = dict(theta) | _expected(system, trial)
-    with_effects = f" with effect {effects[0]}" if effects else ""
     try:
         found = system.predict(theta, effects, trial)
     except LacunaError:
@@ -78,11 +77,11 @@ def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Rec
         return no_prediction(trial)
     except Exception as error:
         raise MisuseError(
-            f"trial {trial.name}, channel {listed(list(trial.channels))}: the model{with_effects} raises"
+            f"trial {trial.name}, channel {listed(list(trial.channels))}: the model{_with(effects)} raises"
             f" {type(error).__name__}: {error}"
         ) from error
     if fault := misshapen(found, trial):
-        raise MisuseError(f"trial {trial.name}, {fault}{with_effects}.")
+        raise MisuseError(f"trial {trial.name}, {fault}{_with(effects)}.")
     return {name: np.array(found[name], float) for name in trial.channels}
 
 
@@ -146,15 +145,25 @@ def _check_start_sizes(system: System, start: Theta, effect: Effect, seen: Seque
 
 
 def _failure(system: System, theta: Theta, effect: Effect, trial: Record) -> str:
-    """Why a trial cannot be simulated at all with an effect; empty if it can. Raises MisuseError for a prediction of
-    the wrong shape: a slip, not a value that is too extreme."""
-    found = system.attempt({**theta, **_expected(system, trial)}, (effect.name,), trial)
+    """Why a trial cannot be simulated at all with an effect; empty if it can. Raises MisuseError, as `_attempted`."""
+    found = _attempted(system, theta, (effect.name,), trial)
     if isinstance(found, str):
         return found
-    if fault := misshapen(found, trial):
-        raise MisuseError(f"trial {trial.name}, {fault}, with effect {effect.name}.")
     known = any((np.isfinite(found[c]) & np.isfinite(measured)).any() for c, measured in trial.channels.items())
     return "" if known else "the prediction is NaN"
+
+
+def _attempted(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels | str:
+    """A prediction of a trial away from the initial values, or why it fails. Raises MisuseError for one of the wrong
+    shape: a slip, since these values are not extreme."""
+    found = system.attempt({**theta, **_expected(system, trial)}, effects, trial)
+    if not isinstance(found, str) and (fault := misshapen(found, trial)):
+        raise MisuseError(f"trial {trial.name}, {fault}{_with(effects)}.")
+    return found
+
+
+def _with(effects: tuple[str, ...]) -> str:
+    return f" with effect {effects[0]}" if effects else ""
 
 
 def _start_sizes(effect: Effect, factors: Iterable[float]) -> list[dict[str, float]]:
@@ -225,7 +234,8 @@ def _idle(system: System, start: Theta, trials: Sequence[Record], predictions: M
         step = p.step_scale if p.value + p.step_scale <= p.upper else -p.step_scale
         moved = dict(start) | {p.name: min(max(p.value + step, p.lower), p.upper)}
         touched = (t for t in trials if system.matters(p.name, t))
-        if not any(changed(predicted(system, moved, (), t), predictions[t.name], t, 0.0) for t in touched):
+        tried = ((t, _attempted(system, moved, (), t)) for t in touched)
+        if not any(isinstance(found, str) or changed(found, predictions[t.name], t, 0.0) for t, found in tried):
             idle.append(p.name)
     return idle
 

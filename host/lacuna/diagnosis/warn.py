@@ -13,8 +13,10 @@ from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.errors import listed
 from lacuna.estimation.fit import Fit, evaluate_on
+from lacuna.estimation.problem import LARGEST_STEP, Point, Problem
 from lacuna.estimation.structure import is_learnt
 from lacuna.estimation.uncertainty import Estimate, pieces_of, uncertainty
+from lacuna.system import misshapen
 
 _MIN_Z = 4.0  # standard deviations
 _MAX_REPEAT_RATIO = 3.0  # times the noise: residuals of repeats hardly differ by as much unless their predictions do
@@ -116,7 +118,43 @@ def warnings_of(fitted: Fit, split: Split) -> tuple[str, ...]:
             f"The model could not predict {listed(names)}: counted as badly predicted when explanations are compared,"
             " and left out of the errors."
         )
-    return (*said, *_parameters(fitted), *_far_nuisances(fits))
+    return (*said, *_edges(fitted), *_parameters(fitted), *_far_nuisances(fits))
+
+
+def _edges(fitted: Fit) -> list[str]:
+    """Warnings for parameters with failing simulations close by: a search takes no step to where the model fails, so it
+    may have stopped there. Close is a standard deviation, or as far as derivatives step, since a derivative with a
+    failing step makes the standard deviation tiny."""
+    problem, point, structure = fitted.problem, fitted.solution.point, fitted.structure
+    failing_here = failed(with_residuals([fitted]))
+    lower, upper = structure.bounds(point.values)
+    found = []
+    for estimate, index in zip(uncertainty(fitted).estimates, fitted.solution.free, strict=True):
+        scale = structure.parameters[index].step_scale
+        far = np.clip(estimate.sd, LARGEST_STEP * scale, scale)
+        for value in np.clip([estimate.value - far, estimate.value + far], lower[index], upper[index]):
+            if is_learnt(estimate.name) or value == estimate.value:
+                continue
+            moved = Point(np.where(np.arange(len(lower)) == index, value, point.values), point.nuisances)
+            predictions = problem.predict_all(moved)
+            failing = failed(zip(problem.trials, problem.scaled(predictions), strict=True))
+            if newly := [name for name in failing if name not in failing_here]:
+                stopped, there = (structure.system.told(estimate.name, v) for v in (estimate.value, value))
+                found.append(
+                    f"{estimate.name} = {_quantity(stopped, estimate.unit)} may be where the search had to stop, not"
+                    f" the best value: close by, at {there:.4g}, simulations fail, such as that of {newly[0]}"
+                    f" ({_cause(problem, moved, newly[0])})."
+                )
+    return found
+
+
+def _cause(problem: Problem, point: Point, name: str) -> str:
+    """Why the simulation of a trial fails."""
+    index, structure = [t.name for t in problem.trials].index(name), problem.structure
+    trial, theta = problem.trials[index], structure.theta(point.values)
+    values = {**theta, **problem.named(index, point.nuisances[index])}
+    found = structure.system.attempt(values, structure.effects, trial, corrections=structure.corrections(theta))
+    return found if isinstance(found, str) else misshapen(found, trial) or "the prediction is NaN"
 
 
 def _parameters(fitted: Fit) -> list[str]:

@@ -128,7 +128,7 @@ def with_bend(found):
     [
         (lambda: math.sqrt(-1.0), r"effect bend cannot be simulated .*\(bend.by = 0.05, .*run 0: ValueError: "),
         (lambda: {"y": T * np.nan}, "effect bend cannot be simulated at any .*run 0: the prediction is NaN"),
-        (lambda: {"y": T[1:]}, r"run 0, channel y: predicted with shape \(100,\), .* with effect bend"),
+        (lambda: {"y": T[1:]}, r"run 0, channel y: predicted with shape \(100,\).* with effect bend"),
         (lambda: {"x": T}, "run 0, channel y: not predicted; the model returns x"),
     ],
 )

@@ -1,6 +1,7 @@
 """A plain function as a system: its failures during a search, and derivatives with respect to its factors."""
 
 import math
+import re
 
 import heater
 import numpy as np
@@ -49,6 +50,29 @@ def test_a_search_goes_on_where_the_model_fails(how):
     found = at_a_far_gain(with_records(failing(how), heater.records(1)))
     assert found.shape == heater.TIME_S.shape
     assert np.isnan(found).all()
+
+
+def fails_above(limit, how):
+    """A warning about a model that fails above a gain, 0.9 K/W being the true one."""
+
+    def simulate(record, theta):
+        found = heater.bare(record, theta)
+        return how(found) if theta.gain_K_W > limit else found
+
+    verdict = lacuna.diagnose(heater.modelled(simulate), heater.records(2), progress=False)
+    return " ".join(verdict.warnings)
+
+
+@pytest.mark.parametrize(
+    ("how", "cause"),
+    [
+        (lambda y: math.sqrt(-1.0), "ValueError: math domain error"),
+        (lambda y: y[:-5], r"shape \(235,\), measured with"),
+    ],
+)
+def test_says_that_a_fit_may_have_stopped_where_the_model_fails(how, cause):
+    assert re.search(rf"gain_K_W = 0\.89 K/W may be where .* simulations fail.*{cause}", fails_above(0.89, how))
+    assert "simulations fail" not in fails_above(1.0, how)
 
 
 def test_any_other_error_of_the_model_says_where():
