@@ -91,7 +91,7 @@ def read(data: Any) -> list[Record | Table]:
     if isinstance(data, str | Path):
         return _folder(Path(data))
     if isinstance(data, Record | Table):
-        return [data]
+        return [_table(data, "")]
     if _is_table(data):
         return [_table(part, name) for name, part in _parts(data)]
     if isinstance(data, Mapping):
@@ -140,7 +140,24 @@ def _parts(data: Any) -> list[tuple[str, Any]]:
 
 
 def _table(data: Any, name: str) -> Record | Table:
-    return data if isinstance(data, Record | Table) else _of_columns(data, name)
+    if isinstance(data, Record):
+        return _of_record(data)
+    return data if isinstance(data, Table) else _of_columns(data, name)
+
+
+def _of_record(given: Record) -> Record:
+    """Return a user's own `Record` with its columns read like those of a table."""
+    name = given.name
+    for what, columns in (("channels", given.channels), ("inputs", given.inputs)):
+        if not isinstance(columns, Mapping):
+            raise RecordError(f"record {name}: its {what} are a {type(columns).__name__}: give columns by name.")
+    return replace(
+        given,
+        condition=_hashable(given.condition, name),
+        time_s=_seconds(given.time_s, name),
+        channels={n: _samples(column, name, n) for n, column in given.channels.items()},
+        inputs={n: _own(column, name, n) for n, column in given.inputs.items()},
+    )
 
 
 def _of_columns(data: Any, name: str) -> Table:
@@ -148,7 +165,10 @@ def _of_columns(data: Any, name: str) -> Table:
     labels = {label: attrs.pop(label) for label in _LABELS if label in attrs}
     for label in _LABELS:
         if label in columns:
-            labels[label] = _single(columns.pop(label), name, label)
+            column = columns.pop(label)
+            whole = label == "condition" and isinstance(column, tuple)
+            labels[label] = column if whole else _single(column, name, label)
+    labels |= {"condition": _hashable(labels["condition"], name)} if "condition" in labels else {}
     clock = next((t for t in TIMES if t in columns), "")
     if clock:
         time_s = columns.pop(clock)
@@ -214,7 +234,7 @@ def _samples(column: Any, record: str, name: str) -> np.ndarray:
         sample = at // (column.size // len(column)) if column.ndim else at
         seconds = "; count seconds from its start" if name in TIMES else ""
         raise RecordError(
-            f"record {record}, sample {sample}: column {name} has {column.ravel()[at]!r}, which is not a"
+            f"record {record}, sample {sample}: column {name} has {plain(column.ravel()[at])!r}, which is not a"
             f" number{seconds}. Replace it by a number, or leave the column out."
         )
     return np.array(cells, float).reshape(column.shape)
@@ -252,9 +272,21 @@ def _single(column: Any, record: str, label: str) -> Any:
         raise RecordError(
             f"record {record}, sample {missing[0]}: its {label} is missing; give every sample the same one."
         )
-    if len(set(cells.tolist())) != 1:
+    if len({_hashable(cell, record) for cell in cells.tolist()}) != 1:
         raise RecordError(f"record {record}: its {label} differs between samples; give every sample the same one.")
     return cells[0]
+
+
+def _hashable(condition: Any, record: str) -> Any:
+    """Return `condition`. Raises RecordError if records cannot be grouped by it."""
+    try:
+        hash(condition)
+    except TypeError:
+        raise RecordError(
+            f"record {record}: its condition is a {type(condition).__name__}: give one label, such as a text, a number,"
+            " or a tuple of these."
+        ) from None
+    return condition
 
 
 def _whole(order: Any, record: str) -> int | None:

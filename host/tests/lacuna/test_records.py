@@ -258,6 +258,40 @@ def test_what_is_masked_is_missing():
     assert np.isnan(one.record(["y"]).channels["y"]).tolist() == [False, True, False]
 
 
+def own(**changes):
+    """A user's own `Record`, as it is read."""
+    given = {"condition": "hot", "time_s": np.arange(10.0), "channels": {"y": np.arange(10.0)}}
+    (found,) = read([lacuna.Record("a", "run", **{**given, **changes})])
+    return found
+
+
+def test_columns_of_ones_own_record_are_read_like_those_of_a_table():
+    pandas = pytest.importorskip("pandas")
+    masked = np.ma.masked_equal(np.arange(10), 7)
+    found = own(channels={"y": masked}, inputs={"u": list(range(10)), "on": "true"}, time_s=pandas.Series(range(10)))
+    assert np.isnan(found.channels["y"]).tolist() == [k == 7 for k in range(10)]
+    assert (found["u"][3], found["on"], found.time_s[9]) == (3.0, 1.0, 9.0)
+    assert all(type(found[name]) is np.ndarray for name in ("time_s", "y", "u"))
+    with pytest.raises(RecordError, match="record a, sample 0: column y has 'x', which is not a number"):
+        own(channels={"y": ["x"] * 10})
+    with pytest.raises(RecordError, match="record a: its channels are a MaskedArray: give columns by name"):
+        own(channels=masked)
+
+
+@pytest.mark.parametrize("condition", [{"bar": 4}, [1, 2], {1}, ("hot", [4])])
+def test_a_condition_by_which_nothing_can_be_grouped_is_refused(condition):
+    with pytest.raises(RecordError, match=r"record a: its condition is a .*: give one label"):
+        own(condition=condition)
+    table = {"time_s": np.arange(10.0), "y": np.arange(10.0), "condition": condition}
+    with pytest.raises(RecordError, match="record 1: its condition"):
+        read(table)
+
+
+def test_a_tuple_is_one_condition():
+    table = {"time_s": np.arange(10.0), "y": np.arange(10.0), "condition": ("hot", 4.0)}
+    assert read(table)[0].record(["y"]).condition == own(condition=("hot", 4.0)).condition == ("hot", 4.0)
+
+
 def test_missing_labels_are_asked_for():
     pandas = pytest.importorskip("pandas")
     table = pandas.DataFrame({"time_s": [0.0, 1.0, 0.0, 1.0], "y": [1.0, 2.0, 3.0, 4.0]})
