@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -482,7 +483,8 @@ def windows(
     Each window has its own initial state: let `simulate` take it from the window's first samples or from nuisances.
     After the first `skip` seconds, a window starts every `every` seconds (default: where the previous one ended). If
     the input is periodic, give its `period`, in seconds: windows at the same phase are then repeats of one another;
-    without it there are no repeats. Raises RecordError.
+    without it there are no repeats. Windows with a gap of more than a quarter of their length are left out. Raises
+    RecordError.
     """
     table = _one_long(data)
     if functions := [name for name, column in table.columns.items() if callable(column)]:
@@ -491,7 +493,8 @@ def windows(
             " at 0. Give its samples at the record's times; if it is not one of time, let the model call it itself."
         )
     time = table.time_s - table.time_s[0]
-    sample = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+    steps = np.diff(time)
+    sample = float(np.median(steps)) if len(steps) else np.inf
     every = seconds if every is None else every
     limits = {
         "seconds": (seconds, _MIN_SAMPLES),
@@ -500,21 +503,36 @@ def windows(
     }
     for what, (given, samples) in (limits | {"skip": (skip, 0)}).items():
         if not isinstance(given, Real) or not samples * sample <= float(given) < np.inf:
-            raise RecordError(f"record {table.name}: {what} is {given!r}; its samples are {sample:g} s apart.")
+            least = f": give at least {samples * sample:g}, {samples} of them" if samples > 1 else ""
+            raise RecordError(f"record {table.name}: {what} is {given!r}; its samples are {sample:g} s apart{least}.")
     starts = np.arange(skip, time[-1] - seconds + 1.5 * sample, every)
     if len(starts) < 3:
         raise RecordError(f"record {table.name} lasts {time[-1]:.4g} s, too short for three windows of {seconds:g} s.")
-    size = round(seconds / sample)
+    even, size = bool((np.abs(steps - sample) < 0.5 * sample).all()), round(seconds / sample)
+    digits = 3 - math.floor(math.log10(sample))  # a thousandth of a sample: smaller differences of phase are rounding
     found = []
     for place, start in enumerate(starts):
-        first = int(np.searchsorted(time, start - 0.5 * sample))
-        at = slice(first, min(first + size, len(time)))
-        phase = round(start % period, 9) if period else place
+        first, last = (int(np.searchsorted(time, edge - 0.5 * sample)) for edge in (start, start + seconds))
+        at = slice(first, min(first + size, len(time)) if even else last)
+        if not even and _is_holed(time[at], start, start + seconds):
+            continue
+        phase = round(start % period, digits) if period else place
         phase = 0.0 if period and period - phase < 0.5 * sample else phase
         name = _part(table, f"window {place + 1}")
-        window = _cut(table, at, name, {"condition": f"from {phase:g} s" if period else name, "order": place})
+        window = _cut(table, at, name, {"condition": f"from {phase:.15g} s" if period else name, "order": place})
         found.append(replace(window, time_s=time[at] - time[at][0]))
+    if len(found) < 3:
+        raise RecordError(
+            f"record {table.name}: {len(found)} of {len(starts)} windows of {seconds:g} s have {_MIN_SAMPLES} samples"
+            " and no gap of more than a quarter of that: a diagnosis needs three. Choose longer or shorter ones."
+        )
     return found
+
+
+def _is_holed(time: np.ndarray, start: float, end: float) -> bool:
+    """Whether a window from `start` to `end` has too few samples, or a gap of more than a quarter of its length."""
+    gaps = np.diff([start, *time, end])
+    return len(time) < _MIN_SAMPLES or bool(gaps.max() > 0.25 * (end - start))
 
 
 def segments(data: Any, count: int = 10) -> list[Table]:

@@ -123,6 +123,41 @@ def test_windows_are_of_seconds(how):
         lacuna.windows(long, **{"seconds": 10.0, **how})
 
 
+def test_says_how_long_a_window_must_be():
+    with pytest.raises(RecordError, match=r"seconds is 3\.0; its samples are 0\.5 s apart: give at least 4, 8 of them"):
+        windows({"time_s": 0.5 * np.arange(100), "y": np.arange(100.0)}, 3.0)
+
+
+def test_windows_of_a_record_with_a_pause_have_no_hole_and_share_no_sample():
+    time = np.r_[np.arange(200), np.arange(306, 506)] / 10.0
+    cut = windows({"time_s": time, "y": time}, 2.0)
+    assert [float(part.columns["y"][0]) for part in cut] == [*range(0, 20, 2), *range(32, 50, 2)]
+    assert {len(part.time_s) for part in cut} == {20}
+    cut = windows({"time_s": time, "y": time}, 2.0, every=0.2)
+    assert len({part.columns["y"].tobytes() for part in cut}) == len(cut)
+
+
+def test_windows_of_uneven_samples_last_as_many_seconds():
+    time = np.sort(np.random.default_rng(1).uniform(0.0, 60.0, 900))
+    cut = windows({"time_s": time, "y": time}, 5.0)
+    ends = np.array([(part.columns["y"][0], part.columns["y"][-1]) for part in cut])
+    assert (np.abs(np.round(ends / 5.0) * 5.0 - ends) < 0.5).all()
+    assert len(np.unique(np.concatenate([part.columns["y"] for part in cut]))) == sum(len(part.time_s) for part in cut)
+
+
+def test_a_record_with_hardly_a_window_without_a_gap_is_refused():
+    time = np.r_[np.arange(40), np.arange(90, 130), np.arange(180, 200)].astype(float)
+    with pytest.raises(RecordError, match=r"record 1: 2 of 5 windows of 40 s have 8 samples and no gap"):
+        windows({"time_s": time, "y": time}, 40.0, every=40.0)
+
+
+@pytest.mark.parametrize("scale", [1e-11, 1.0, 1e5])
+def test_phases_are_told_apart_on_any_scale_of_time(scale):
+    time = scale * np.arange(3000)
+    cut = windows({"time_s": time, "y": time}, 25.0 * scale, period=1500.0 * scale, every=1.5 * scale)
+    assert len({part.labels["condition"] for part in cut}) == 1000
+
+
 def test_parts_of_several_runs_go_together_by_the_runs_names():
     runs = [{"name": name, "time_s": np.arange(100.0), "y": np.arange(100.0)} for name in ("monday", "friday")]
     parts = [part for run in runs for part in segments(run, 3)]
