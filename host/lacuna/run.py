@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lacuna.check.given import check_members
 from lacuna.check.grains import grains_of
 from lacuna.check.numbers import within
 from lacuna.diagnosis import diagnose as engine
@@ -71,6 +72,7 @@ def diagnose(
     suspects = several(suspected, str)
     if records is not None or not hasattr(system, "predict"):  # `with_records` reports that
         system = with_records(system, records)
+    check_members(system)
     if names := several(test, str):
         system = _with_test(system, names)
     shown = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)

@@ -2,7 +2,7 @@
 from the right column, not milliseconds taken for seconds."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import inf
 
 import numpy as np
@@ -10,13 +10,38 @@ import numpy as np
 from lacuna.check.numbers import SAME, spread
 from lacuna.errors import MisuseError, TooLittleDataError
 from lacuna.records import TIMES, describe_reversal
-from lacuna.system import Record, System, by_channel
+from lacuna.system import Effect, Parameter, Record, System, by_channel
 
 _FEWEST_TRIALS, _FEWEST_SAMPLES = 3, 8
 _BARE = ("time", "t")  # names that do not state a unit
 _OF_SECOND = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 _RATES = ("1/s", "Hz", "rad/s")
 _COARSE = 2.0  # samples further apart than this multiple of the longest time constant resolve none
+
+
+def check_members(system: System) -> None:
+    """Raise MisuseError if what a system declares is not of the kind that `System` says."""
+    if isinstance(system, type):
+        raise MisuseError(f"{system.__name__} is a class: give an instance, {system.__name__}(...).")
+    of = type(system).__name__
+    if not isinstance(name := getattr(system, "name", None), str):
+        raise MisuseError(f"{of}.name is {name!r}: give a string.")
+    effects = getattr(system, "effects", None)
+    if not isinstance(effects, Mapping):
+        raise MisuseError(f"{of}.effects is a {type(effects).__name__}: give a mapping from names to effects.")
+    members = {name: getattr(system, name, None) for name in ("parameters", "trials")}
+    for what, found, kind in (
+        ("effects", tuple(effects.values()), Effect),
+        ("parameters", members["parameters"], Parameter),
+        ("trials", members["trials"], Record),
+    ):
+        if not isinstance(found, Sequence):
+            raise MisuseError(f"{of}.{what} is a {type(found).__name__}: give a sequence of {kind.__name__}s.")
+        for one in found:
+            if not isinstance(one, kind):
+                raise MisuseError(
+                    f"{of}.{what} holds {one!r:.60}, which is a {type(one).__name__}, not {kind.__name__}."
+                )
 
 
 def check_names(system: System, trials: Sequence[Record]) -> None:

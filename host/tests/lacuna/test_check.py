@@ -195,6 +195,23 @@ def test_refuses_a_system_saying(said):
         diagnose(REFUSED[said], on_progress=pytest.fail)
 
 
+@pytest.mark.parametrize(
+    ("system", "said"),
+    [
+        (Line, r"Line is a class: give an instance, Line\(\.\.\.\)"),
+        (Line(name=3), "Line.name is 3: give a string"),
+        (Line(effects=(Effect("bend", BEND),)), "Line.effects is a tuple: give a mapping from names to effects"),
+        (Line(effects={"bend": BEND}), r"Line.effects holds Parameter\(.*, which is a Parameter, not Effect"),
+        (Line(parameters=BEND), "Line.parameters is a Parameter: give a sequence of Parameters"),
+        (Line(trials=None), "Line.trials is a NoneType: give a sequence of Records"),
+        (Line(trials=({"y": Y},) * 3), "Line.trials holds .*, which is a dict, not Record"),
+    ],
+)
+def test_refuses_a_system_of_ones_own_that_declares_something_else(system, said):
+    with pytest.raises(MisuseError, match=said):
+        lacuna.diagnose(system, progress=pytest.fail)
+
+
 @pytest.mark.parametrize("count", [0, 2])
 def test_refuses_fewer_trials_than_needed(count):
     with pytest.raises(TooLittleDataError, match=f"{count} trials given: a diagnosis needs at least 3"):
