@@ -16,6 +16,7 @@ from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
 from lacuna.records import Table, segments
 from lacuna.run import with_records
+from lacuna.values import Values
 
 
 def test_what_a_loop_reads_of_an_effect_is_no_search_among_names():
@@ -24,6 +25,19 @@ def test_what_a_loop_reads_of_an_effect_is_no_search_among_names():
     assert vars(vars(found)["sensor_lag"])["lag_s"] == found.sensor_lag["lag_s"] == found["sensor_lag.lag_s"] == 0.0
     with pytest.raises(AttributeError, match="wire: there are gain_K_W"):
         _ = found.wire
+
+
+@pytest.mark.parametrize("read", [lambda values: values, lambda values: values.with_attributes()])
+def test_a_micro_sign_is_an_attribute_though_python_takes_it_for_a_greek_letter(read):
+    found = read(Values({"\N{MICRO SIGN}": 0.2, "belt.\N{MICRO SIGN}_s": 0.3}))
+    as_python_reads_it = "\N{GREEK SMALL LETTER MU}"
+    assert getattr(found, as_python_reads_it) == 0.2
+    assert getattr(found.belt, f"{as_python_reads_it}_s") == 0.3
+
+
+def test_a_name_that_theta_does_not_have_is_answered_with_those_it_has():
+    with pytest.raises(KeyError, match=r"dry friction: there are mass_kg, dry friction\.force_N"):
+        _ = Values({"mass_kg": 1.0, "dry friction.force_N": 2.0})["dry friction"]
 
 
 FAR = 1.3  # the model fails above this gain
