@@ -11,7 +11,7 @@ A parameter of the base model has a plain name (`body_damping_Ns_m`), a paramete
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Integral, Real
 from typing import Any, Protocol
@@ -216,10 +216,20 @@ class Record:
 
     def __getitem__(self, name: str) -> Any:
         """Return an input, a measured channel, or `time_s`. Raises KeyError, listing what there is."""
-        columns = {"time_s": self.time_s, **self.channels, **self.inputs}
+        columns = self._columns()
         if name not in columns:
             raise KeyError(f"{name}: record {self.name} has {', '.join(columns)}")
         return columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns()
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the columns, as a mapping does."""
+        return iter(self._columns())
+
+    def _columns(self) -> dict[str, Any]:
+        return {"time_s": self.time_s, **self.channels, **self.inputs}
 
     def __repr__(self) -> str:
         return f"Record({self.name!r}, {len(self.time_s)} samples of {', '.join(self.channels)})"

@@ -389,6 +389,13 @@ def test_anything_else_is_gone_through_cell_by_cell(tmp_path, text):
     assert numbers_alone(tmp_path / "a.csv") is None
 
 
+def test_a_record_knows_its_columns_by_name():
+    record = lacuna.Record("a", "run", 0, np.arange(10.0), {"y": np.arange(10.0)}, inputs={"force_N": np.zeros(10)})
+    assert list(record) == ["time_s", "y", "force_N"]
+    assert "force_N" in record
+    assert "force" not in record
+
+
 @pytest.mark.parametrize(
     "name", ["records.Table", "records.read", "records.segments", "values.Values", "errors.MisuseError"]
 )
