@@ -25,8 +25,8 @@ class CompletedModel:
     `record` is anything that `diagnose` accepts as one record. `theta` maps parameters to values that replace the
     fitted ones, which are in `model.theta`. Nuisances have their expected values unless `theta` gives others; if these
     depend on an output that the record lacks, give them all. Returns what `simulate` returns; for a segment of a longer
-    record, only the segment's own samples. If the model is a function, an unknown, fixed or tied parameter raises
-    MisuseError.
+    record, only the segment's own samples. If the model is a function, an unknown parameter raises MisuseError, and so
+    does another value of a fixed or tied one.
     """
 
     def __init__(self, system: System, fitted: Fit):
@@ -48,7 +48,7 @@ class CompletedModel:
         values = system.values(fitted, self._corrections)
         if unknown := set(given) - set(values) - self._nuisances:
             raise MisuseError(f"no parameter {', '.join(sorted(unknown))}; there are {', '.join(values)}.")
-        if held := [name for name in given if name in system.held]:
+        if held := [name for name in given if name in system.held and given[name] != values[name]]:
             raise MisuseError(f"{held[0]} is fixed or tied, so it cannot be given: declare the system without that.")
         values |= given
         system.held.fill(values)

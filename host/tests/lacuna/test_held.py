@@ -86,6 +86,8 @@ def test_a_completed_model_ties_again_what_is_tied_and_takes_nothing_that_is_hel
     system = lacuna.System(simulate, parameters, tied={"right": "left"}, fixed={"known": 1.0}).with_trials(trials)
     model = CompletedModel(system, fit(Structure(system), trials, estimate_noise(system, trials)))
     assert model(trials[0], {"left": 3.0})["y"][0] == 4.0
+    np.testing.assert_array_equal(model(trials[0], model.theta)["y"], model(trials[0])["y"])
+    assert model(trials[0], model.theta | {"left": 3.0})["y"][0] == 4.0
     for name in ("right", "known"):
         with pytest.raises(MisuseError, match=f"{name} is fixed or tied"):
             model(trials[0], {name: 3.0})
