@@ -35,7 +35,8 @@ class Parameter:
     reasonable values, both ends finite (None: not known); a fit that leaves it is evidence against the model, not an
     error. `scale` is the change of the parameter that matters, in its own unit; derivatives step by a small fraction of
     it (never relative to the value, which may be 0). For a nuisance it is the standard deviation from run to run, so
-    declare it there. The default is a tenth of |value|, or of the range if the value is 0. `prior_sd` is the standard
+    declare it there. The default is a tenth of |value|, or of the range, which must then be finite, if the value is 0.
+    `prior_sd` is the standard
     deviation of the parameter's prior around `value`; None: no prior.
 
     `at_least`: for a parameter of the base model, the name of another one that it cannot fall below. `elsewhere`:
@@ -65,6 +66,10 @@ class Parameter:
     prior_from_trials: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise DeclarationError(
+                f"a parameter's name is {self.name!r}, which is a {type(self.name).__name__}, not text"
+            )
         for what in ("value", "lower", "upper"):
             if not isinstance(given := getattr(self, what), Real):
                 raise DeclarationError(f"{self.name}: {what} is {given!r}, not a number")
@@ -78,6 +83,11 @@ class Parameter:
             given = getattr(self, what)
             if given is not None and not (_is_number(given) and given > 0.0):
                 raise DeclarationError(f"{self.name}: {what} is {given!r}: give a number above 0, or leave it out")
+        if self.scale is None and not self.value and not np.isfinite(self.upper - self.lower):
+            raise DeclarationError(
+                f"{self.name}: neither its value, 0, nor its range, {self.lower:g} to {self.upper:g}, tells which"
+                " change of it matters: give `scale`, or finite bounds"
+            )
         if not (_is_number(self.grain) and self.grain >= 0.0):
             raise DeclarationError(f"{self.name}: grain is {self.grain!r}: give a number that is not negative")
         object.__setattr__(self, "elsewhere", several(self.elsewhere, Real))

@@ -260,7 +260,7 @@ REFUSED_DECLARATIONS = {
     "apart of effect bend names 'slop', which is no parameter": {"effects": Effect("bend", BEND, apart="slop")},
     "absent at infinity": {"effects": replace(heater.LIMITED, parameters=Parameter("W", "W", 8.0, -1.0, np.inf))},
     "a typical value other than 0": {
-        "effects": replace(heater.LIMITED, parameters=Parameter("W", "W", 0.0, 0.0, np.inf))
+        "effects": replace(heater.LIMITED, parameters=Parameter("W", "W", 0.0, 0.0, np.inf, scale=1.0))
     },
     r"curve 'loss\.left': choose another name, without a dot": {"curves": replace(LOSS, name="loss.left")},
     r"spare is a collection of conditions: write \['sweep 4 W'\]": {"spare": "sweep 4 W"},
@@ -330,6 +330,18 @@ def test_refuses_a_parameter_that_is_none(told):
     why = "not a number|is not below|outside|fits begin there|a number above 0|not negative|the lower first"
     with pytest.raises(DeclarationError, match=f"gain: {next(iter(told))} .*({why})|is of type"):
         Parameter("gain", "", **{"value": 1.0, "lower": 0.1, "upper": math.inf, **told})
+
+
+@pytest.mark.parametrize("bounds", [(-math.inf, math.inf), (0.0, math.inf)])
+def test_refuses_a_parameter_that_does_not_say_which_change_of_it_matters(bounds):
+    with pytest.raises(DeclarationError, match=r"rest: neither its value, 0, nor its range.*tells.*give `scale`"):
+        Parameter("rest", "mm", 0.0, *bounds)
+    assert Parameter("rest", "mm", 0.0, *bounds, scale=0.5).step_scale == 0.5
+
+
+def test_refuses_a_parameter_whose_name_is_no_text():
+    with pytest.raises(DeclarationError, match="a parameter's name is 1, which is a int, not text"):
+        Parameter(1, "", 0.5, 0.0, 5.0)
 
 
 UNBOUNDED = {"lower": -math.inf, "upper": math.inf}
