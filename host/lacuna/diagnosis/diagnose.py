@@ -260,6 +260,8 @@ def _doubts(
         return _unsupported(case, found, tried)
     within, library = case.intervals(choice.candidate), case.system.effects
     absent = [name for name in choice.candidate.effects if may_be_absent(library[name], within)]
+    stopped = warn.stopped_by_bounds(case.settled(choice.candidate)) if absent else set()
+    absent = [name for name in absent if name not in stopped]  # a bound makes the interval wide
     return [*warn.doubts(choice, case.split, judged.tested), *warn.perhaps_absent(absent)]
 
 

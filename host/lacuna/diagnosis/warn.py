@@ -89,6 +89,13 @@ def perhaps_absent(names: Sequence[str]) -> list[str]:
     ]
 
 
+def stopped_by_bounds(fitted: Fit) -> set[str]:
+    """Effects with a size at a bound other than the size at which they are absent, of which another warning tells."""
+    at = {e.name: _bound(fitted, e) for e in uncertainty(fitted).estimates if e.at_bound and e.determined}
+    effects = (fitted.structure.system.effects[name] for name in fitted.structure.effects)
+    return {e.name for e in effects if any(at.get(size, e.absent) != e.absent for size in e.size_names)}
+
+
 def follow_in_words(followed: Sequence[Followed]) -> str:
     """Nuisances that follow the condition, as a clause."""
     each = [f"{100 * one.share:.0f} % of the variance of {one.nuisance}" for one in followed]

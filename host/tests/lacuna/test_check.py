@@ -504,6 +504,26 @@ def test_what_the_data_leave_open_is_not_told_to_be_at_its_bound():
     assert "bound" not in said
 
 
+def test_the_size_of_an_effect_that_its_bound_stops_is_not_said_to_be_hardly_known():
+    def slowing(w0, c, k):
+        return (w0 + k / c) * np.exp(-10.0 * c * T) - k / c
+
+    def simulate(record, theta):
+        return {"w": slowing(record["w0"], theta.c, theta.dry.k)}
+
+    dry = Effect("dry", Parameter("k", "rad/s2", 0.15, 0.0, 0.3))
+    system = lacuna.System(simulate, Parameter("c", "1/s", 0.05, 0.001, 1.0), dry)
+    draw = np.random.default_rng(0)
+    wheels = [
+        {"time_s": T, "w0": w0, "condition": w0, "w": slowing(w0, 0.08, 0.4) + 0.05 * draw.standard_normal(101)}
+        for w0 in (10.0, 20.0, 30.0)
+        for _ in range(3)
+    ]
+    said = " ".join(lacuna.diagnose(system, wheels, progress=False).warnings)
+    assert "dry.k is at its bound (0.3 rad/s2)" in said
+    assert "hardly known" not in said
+
+
 def test_warns_of_a_nuisance_at_its_limit():
     records = heater.records(repeats=2, seed=3)
     records["steps_4W_1"]["temperature_K"] += 5.0
