@@ -51,8 +51,9 @@ class Table:
         for output in outputs:
             if output not in self.columns:
                 raise RecordError(
-                    f"record {self.name} has no column {output}; it has {listed(self.columns, _MAX_LISTED)}. Where an"
-                    " output was not measured, give a lacuna.Record whose `channels` leave it out."
+                    f"record {self.name} has no column {output}; it has {listed(self.columns, _MAX_LISTED)}. If it was"
+                    " never measured, name the outputs that were: System(..., outputs=...); if only this record lacks"
+                    " it, give this one as a lacuna.Record whose `channels` leave it out."
                 )
         return Record(
             name=self.name,
@@ -96,6 +97,12 @@ def read(data: Any) -> list[Record | Table]:
     if _is_table(data):
         return [_table(part, name) for name, part in _parts(data)]
     if isinstance(data, Mapping):
+        for name, one in data.items():
+            if isinstance(one, list | tuple) and any(map(_is_record, one)):
+                raise RecordError(
+                    f"{name} holds {len(one)} records: give a mapping of names to single records, or one list of all,"
+                    " and those that are repeats the same `condition`."
+                )
         if any(isinstance(column, np.ndarray | list | tuple) for column in data.values()):
             raise RecordError(f"a record of {listed(data, _MAX_LISTED)} has no times: {_GIVE_TIMES}.")
         return [_table(one, str(name)) for name, one in data.items()]
@@ -114,6 +121,10 @@ def _is_table(data: Any) -> bool:
         for name in TIMES
         if name in data
     )
+
+
+def _is_record(data: Any) -> bool:
+    return isinstance(data, Mapping | Record | Table) or _is_pandas(data) or _is_xarray(data)
 
 
 def _is_pandas(data: Any) -> bool:
@@ -384,10 +395,14 @@ def cell_by_cell(file: Path) -> dict[str, np.ndarray]:
             above = len(widths) == 1 or max(widths) > len(names)
             preamble = " If the column names are further down, remove the lines above them." if above else ""
             raise RecordError(f"{file.name}, line {line}: {len(row)} values for {len(names)} columns.{preamble}")
-    if twice := [name for name in names if names.count(name) > 1]:
+    for place, name in enumerate(names):
+        if not name and any(row[place].strip() for _, row in rows):
+            raise RecordError(f"{file.name}: column {place + 1} has no name: give it one, or remove it.")
+    if twice := [name for name in names if name and names.count(name) > 1]:
         raise RecordError(f"{file.name} has more than one column {twice[0]!r}: give each its own name.")
     lines, cells = [line for line, _ in rows], zip(*(row for _, row in rows), strict=True)
-    return {name: _typed(column, file, lines, name) for name, column in zip(names, cells, strict=True)}
+    # a comma at the end of every line makes an empty column without a name
+    return {name: _typed(column, file, lines, name) for name, column in zip(names, cells, strict=True) if name}
 
 
 def _lines(file: Path) -> list[tuple[int, list[str]]]:
@@ -577,9 +592,15 @@ def _cut(table: Table, at: slice, name: str, labels: Mapping[str, Any]) -> Table
 
 def _one_long(data: Any) -> Table:
     """Read the one table that is to be cut. Raises RecordError if there is not one, or times do not increase."""
-    found = [one for one in read(data) if isinstance(one, Table)]
-    if len(found) != 1:
-        raise RecordError("give one long record to cut up.")
+    given = read(data)
+    if len(given) != 1:
+        raise RecordError(f"give one long record to cut up, not {len(given)}: cut each by itself, with a `name`.")
+    if any(isinstance(one, Record) for one in given):
+        raise RecordError(
+            f"record {given[0].name} is a lacuna.Record: to cut it up, give its columns as a mapping, with its times as"
+            " time_s."
+        )
+    found = [one for one in given if isinstance(one, Table)]
     if fault := describe_reversal(found[0].time_s):
         raise RecordError(f"record {found[0].name}: {fault}: sort it by time, or give its parts one by one.")
     return found[0]

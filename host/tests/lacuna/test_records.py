@@ -389,6 +389,29 @@ def test_anything_else_is_gone_through_cell_by_cell(tmp_path, text):
     assert numbers_alone(tmp_path / "a.csv") is None
 
 
+def test_a_comma_at_the_end_of_every_line_is_no_column(tmp_path):
+    (one,) = read(write(tmp_path, "a.csv", "time_s,y,\n0,1,\n1,2,\n"))
+    assert list(one.columns) == ["y"]
+    with pytest.raises(RecordError, match=r"a\.csv: column 3 has no name: give it one, or remove it"):
+        read(write(tmp_path, "a.csv", "time_s,y,\n0,1,5\n1,2,6\n"))
+
+
+def test_says_what_to_do_about_an_output_that_was_not_measured():
+    (one,) = read({"time_s": np.arange(9.0), "y": np.arange(9.0)})
+    with pytest.raises(RecordError, match=r"has no column z; it has y\. .* System\(\.\.\., outputs=.* lacuna\.Record"):
+        one.record(["y", "z"])
+
+
+def test_says_what_to_do_with_records_that_are_nested_or_cut_up_wrongly():
+    one = {"time_s": np.arange(90.0), "y": np.arange(90.0)}
+    with pytest.raises(RecordError, match="10 holds 2 records: give a mapping of names to single records"):
+        read({"10": [one, one], "20": [one, one]})
+    with pytest.raises(RecordError, match="give one long record to cut up, not 2: cut each by itself"):
+        segments([one, one])
+    with pytest.raises(RecordError, match=r"record a is a lacuna\.Record: to cut it up, give its columns as a mapping"):
+        segments(lacuna.Record("a", "run", 0, one["time_s"], {"y": one["y"]}))
+
+
 def test_a_record_knows_its_columns_by_name():
     record = lacuna.Record("a", "run", 0, np.arange(10.0), {"y": np.arange(10.0)}, inputs={"force_N": np.zeros(10)})
     assert list(record) == ["time_s", "y", "force_N"]
