@@ -28,7 +28,7 @@ MAX_REESTIMATES = 5  # re-estimates of a floor, at most
 # Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
 _SHIFT_NODES, _SHIFT_WEIGHTS = hermegauss(8)
 _SHIFT_WEIGHTS /= _SHIFT_WEIGHTS.sum()
-_LONGEST_JITTER_S = 0.5
+_LONGEST_JITTER_S = 0.5  # this, and the window, are shorter in a record of less than a second, in proportion
 _MOVING_SIGMAS = 6.0
 _WINDOW_S = 0.05
 _SAME_VALUE = 1e-9  # of a record's range: values closer than this are equal
@@ -246,9 +246,9 @@ def at_times(time_s: np.ndarray, measured_s: np.ndarray, samples: np.ndarray) ->
 
 
 def _moves(trial: Record, channel: str) -> np.ndarray:
-    """Mask of the samples at which a record changes by much more than its fast noise within `_WINDOW_S`."""
+    """Mask of the samples at which a record changes by much more than its fast noise within its `_WINDOW_S`."""
     samples, time_s, period = trial.channels[channel], trial.time_s, sample_period(trial.time_s)
-    window_s = max(1, round(_WINDOW_S / period)) * period
+    window_s = max(1, round(_WINDOW_S * _brevity(time_s) / period)) * period
     smooth = _smooth(samples)
     later, sooner = (np.interp(time_s + way * window_s, time_s, smooth) for way in (1, -1))
     least = 1e-12 * float(np.nanstd(samples))
@@ -274,9 +274,15 @@ def _jitter(
         )
         return float(excess - sum(np.nansum(variance) for variance in variances))
 
-    if lacking(_LONGEST_JITTER_S) > 0:
-        return _LONGEST_JITTER_S
-    return float(brentq(lacking, 0.0, _LONGEST_JITTER_S, xtol=1e-9))
+    longest_s = _LONGEST_JITTER_S * max(_brevity(time_s) for time_s, _ in records)
+    if lacking(longest_s) > 0:
+        return longest_s
+    return float(brentq(lacking, 0.0, longest_s, xtol=2e-9 * longest_s))
+
+
+def _brevity(time_s: np.ndarray) -> float:
+    """The length of a record in seconds, but at most 1."""
+    return min(float(time_s[-1] - time_s[0]), 1.0)
 
 
 def _shift_variance(

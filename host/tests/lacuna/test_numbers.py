@@ -173,3 +173,18 @@ def test_a_model_that_runs_away_beyond_a_border_ends_in_a_verdict(beyond):
     found = lacuna.diagnose(one, records, progress=False)
     assert [e.name for e in found.effects] == ["soft"]
     assert found.effects[0].parameters["per"] == pytest.approx(0.2, rel=0.02)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e-8])
+def test_the_floor_of_a_record_of_milliseconds_is_that_of_a_record_of_a_second(scale):
+    draw, times = np.random.default_rng(3), np.linspace(0.0, 1.0, 201)
+    late = 0.02 * draw.standard_normal(6)
+    steps = [np.tanh((times - 0.5 - by) / 0.02) + 1e-3 * draw.standard_normal(len(times)) for by in late]
+
+    def noise(scale):
+        given = [{"time_s": scale * times, "y": y, "condition": "all"} for y in steps]
+        return estimate_noise(system(), with_records(system(), given).trials).channels["run", "y"]
+
+    assert noise(scale).sd == pytest.approx(noise(1.0).sd)
+    assert noise(scale).jitter_s == pytest.approx(scale * noise(1.0).jitter_s)
+    assert noise(1.0).jitter_s == pytest.approx(np.std(late), rel=0.1)
