@@ -1,5 +1,7 @@
 """Learnt curves outside the range of the data."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from toy import case_of, hide
@@ -11,7 +13,7 @@ from lacuna.estimation.fit import fit
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.shrink import likeliest_size, shrunk
 from lacuna.estimation.structure import Structure, is_learnt
-from lacuna.estimation.uncertainty import Uncertainty, uncertainty
+from lacuna.estimation.uncertainty import uncertainty
 
 TIME_S = np.linspace(0.0, 10.0, 201)
 KNOTS = np.linspace(0.0, 1.0, 33)
@@ -85,6 +87,6 @@ def test_no_knot_of_a_learnt_curve_is_said_to_be_undetermined(monkeypatch):
     case = case_of(hide({}, seed=31))
     name = case.system.parameters[0].name
     undetermined = ({"correction.spring.0_1": 0.9}, {"correction.spring.0_2": 0.6, name: 0.8}, {})
-    monkeypatch.setattr(warn, "uncertainty", lambda _: Uncertainty((), np.eye(0), undetermined))
+    monkeypatch.setattr(warn, "uncertainty", lambda fit: replace(uncertainty(fit), undetermined=undetermined))
     said = warn.warnings_of(case.fit_base(1), case.split)
     assert said == (f"The data hardly determine {name}.",)
