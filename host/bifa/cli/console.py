@@ -78,7 +78,7 @@ def _pipe(uno: "Uno", rig: "Rig") -> bool:
         lines = type_line(uno, line, rig.clock)
         typer.echo("\n".join(lines))
         good = good and lines[-1].startswith("ok")
-        if reports_stop(lines, before, line):
+        if reports_stop(lines, line, before):
             typer.echo("error: the robot has stopped by itself; the remaining lines are not carried out", err=True)
             return False
         before = line

@@ -18,12 +18,14 @@ def is_answer(line: str) -> bool:
     return line.startswith(("ok", "error"))
 
 
-def reports_stop(lines: Iterable[str], *typed: str) -> bool:
-    """Whether `lines` of the Uno report a stop or a fault that the lines `typed` last do not explain. Lines that wait
-    were meant for a robot that had not stopped; a `clear` and a `run` among them would make it walk again."""
-    words = {word for line in typed for word in line.split()[:1]}
-    expected = tuple(report for word, report in (("stop", "[stopped"), ("status", "[fault")) if word in words)
-    return any(line.startswith(("[stopped", "[fault")) and not line.startswith(expected) for line in lines)
+def reports_stop(lines: Iterable[str], typed: str = "", before: str = "") -> bool:
+    """Whether `lines` of the Uno, answers to `typed` included, report a stop or a fault that neither this line nor the
+    one `before` explains. Lines that wait were then meant for a robot that had not stopped; a `clear` and a `run` among
+    them would make it walk again."""
+    faults = sum(line.startswith("[fault") for line in lines)
+    stopped = any(line.startswith("[stopped") for line in lines)
+    asked = any(line.strip() == "stop" or "!" in line for line in (typed, before))
+    return faults > (typed.strip() == "status") or (stopped and not asked)  # `status` shows a fault that is latched
 
 
 def settle(uno: Uno, clock: Clock) -> None:

@@ -96,7 +96,7 @@ class Conversation:
             if lines := list(self.uno.session.lines):
                 self.uno.session.lines.clear()
                 print("\n".join(lines))
-                if reports_stop(lines, self._last_line):
+                if reports_stop(lines, before=self._last_line):
                     self._drop_waiting()
         except RestartedError:
             self._drop_waiting()
@@ -110,7 +110,7 @@ class Conversation:
         before, self._last_line = self._last_line, line
         try:
             lines = type_line(self.uno, line, self._clock)
-            is_over = reports_stop(lines, before, line)
+            is_over = reports_stop(lines, line, before)
         except NoAnswerError as error:
             lines, is_over = [f"-- {error}"], True
         try:

@@ -14,7 +14,7 @@ from bifa.link import MismatchError, NoAnswerError, RestartedError, Uno, frames
 from bifa.link.frames import Report
 from bifa.link.session import Hello, Session
 from bifa.link.table import COMMANDS, REPORTS, STATES
-from bifa.link.terminal import settle
+from bifa.link.terminal import reports_stop, settle
 from bifa.link.units import UnoParameterError
 from bifa.live.monitor import Monitor
 from bifa.live.record import HEADER, telemetry_row
@@ -185,6 +185,26 @@ def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(uno):
     assert done.exit_code == 0, done.output
     assert done.output.count("\\x1b]0;owned\\x07") == 3
     assert done.output.replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize(
+    ("lines", "typed", "before", "stops"),
+    [
+        (["ok"], "run", "", False),
+        (["[stopped: all valves off until clear", "ok"], "save one", "run", True),
+        (["[stopped: all valves off until clear"], "", "run", True),
+        (["[stopped: all valves off until clear"], "", "stop", False),
+        (["ok", "[stopped: all valves off until clear"], "stop", "run", False),
+        (["[stopped: all valves off until clear", "ok"], "clear", " stop", False),
+        (["[stopped: all valves off until clear", "ok"], "show! period_s", "", False),
+        (["[fault sensor_range body value 1 limit 2 at_ms 3"], "", "stop", True),
+        (["[state fault", "[fault sensor_range body value 1 limit 2 at_ms 3", "ok"], "status", "clear", False),
+        (["[fault sensor_range body value 1 limit 2 at_ms 3"], "", "status", True),
+        (["[fault watchdog", "[state fault", "[fault watchdog", "ok"], "status", "", True),
+    ],
+)
+def test_only_a_stop_that_was_typed_is_no_surprise(lines, typed, before, stops):
+    assert reports_stop(lines, typed, before) is stops
 
 
 def test_a_pipe_is_not_carried_out_after_a_stop_that_it_did_not_ask_for(uno):
