@@ -169,7 +169,7 @@ def _summary(optimum: "Optimum") -> Table:
 
 
 def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: Path) -> list[str]:
-    from bifa.gait import library, optimize
+    from bifa.gait import Settings, library, optimize
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution
     from bifa.gait.prediction import FINE_M
@@ -195,7 +195,9 @@ def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folde
     draw_chart(sensitivity_chart(scans), folder / "sensitivity.png")
     if settings.robust:
         robust = optimum.gait
-        quick = replace(settings, robust=False, evaluations=1500)
+        quick = Settings(
+            robust=False, seed=settings.seed, evaluations=1500, spread=settings.spread, space=settings.space
+        )
         fast = optimize(robot, pool, quick).gait
         other = {"fastest on the model": fast}
     else:

@@ -123,6 +123,7 @@ def test_what_an_own_driver_measured_is_not_measured_again_unasked(own_driver, t
 )
 def test_every_stage_that_measures_a_real_robot_keeps_what_it_measured(own_driver, port, kept):
     assert [stage.name for stage in stages_of(port) if stage.by_hand] == kept
+    assert all(stage.resumes for stage in stages_of(port) if stage.by_hand), "an interruption loses nothing either"
 
 
 def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path):
