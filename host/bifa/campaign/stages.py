@@ -239,7 +239,11 @@ def _resumed(scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, 
 
 def trials_in(scratch: Path) -> int:
     """Number of trials that an interrupted stage left in its scratch folder."""
-    return len(list(scratch.glob("**/*.csv")))
+    from bifa.data.layout import TABLE_FILE  # imports numpy, which usage errors need not wait for
+    from bifa.data.write import PARTIAL_SUFFIX
+
+    sets = {*scratch.glob(f"**/*{PARTIAL_SUFFIX}"), *(table.parent for table in scratch.glob(f"**/{TABLE_FILE}"))}
+    return sum(len(list(data.glob("*.csv"))) for data in sets)
 
 
 def _leftover_digests(folder: Path, scratch: Path, stage: Stage, begun: Mapping[str, Any]) -> dict[str, str]:

@@ -13,7 +13,7 @@ import pytest
 
 from bifa.campaign import stages
 from bifa.campaign.progress import StageProgress
-from bifa.campaign.stages import PROVENANCE, Stage, StageError, digest, run_stages
+from bifa.campaign.stages import PROVENANCE, Stage, StageError, digest, run_stages, trials_in
 from bifa.lock import LockedError, locked
 from bifa.screen import Console
 
@@ -331,3 +331,10 @@ def test_what_the_stage_does_is_not_cut_off(width):
     assert "…" not in seen
     assert "done" in seen
     assert max(map(len, seen.splitlines())) <= width
+
+
+def test_kept_trials_are_those_of_finished_and_unfinished_sets(tmp_path):
+    for name in ("walks-2/dataset.toml", "walks-2/a_1.csv", "walks-2/raw/a.csv", "walks-3.partial/b_1.csv"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("")
+    assert trials_in(tmp_path) == 2

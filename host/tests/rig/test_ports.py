@@ -22,16 +22,16 @@ def test_the_virtual_robot_that_is_not_installed_is_said_how_to_get(monkeypatch)
         open_rig("virtual", seed=1)
 
 
-def test_an_open_port_is_not_configured_again(monkeypatch):
+def test_an_open_port_is_not_configured_again(uno, monkeypatch):
     """The Uno's USB bridge may drop what it is still sending, a stop included, when its port is configured."""
-    with SerialRig(PtyUno().device) as rig:
+    with SerialRig(uno.device) as rig:
         monkeypatch.setattr("serial.Serial._reconfigure_port", None)
-        uno = Uno(rig.transport, rig.clock)
-        uno.connect()
-        uno.set("period_s", 3.0)
-        uno.stream(True)
-        assert uno.samples(0.1)
-        uno.stop()
+        connected = Uno(rig.transport, rig.clock)
+        connected.connect()
+        connected.set("period_s", 3.0)
+        connected.stream(True)
+        assert connected.samples(0.1)
+        connected.stop()
 
 
 def test_a_serial_port_exclusive_and_unplugged():
