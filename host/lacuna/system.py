@@ -408,19 +408,12 @@ class System(Protocol):
             found.append(no_prediction(trial) if isinstance(one, str) or misshapen(one, trial) else one)
         return found
 
-    def attempt(
-        self,
-        theta: Theta,
-        effects: tuple[str, ...],
-        trial: Record,
-        *,
-        coarse: bool = False,
-        corrections: Sequence[Correction] = (),
-    ) -> Channels | str:
-        """Predict a trial, or say why it cannot be simulated with these values: the ValueError or ArithmeticError that
-        `predict` raises. Raises MisuseError, naming trial and values, for any other error of the model."""
+    def attempt(self, theta: Theta, effects: tuple[str, ...], trial: Record, **how: Any) -> Channels | str:
+        """Predict a trial (`how`: options of `predict`), or say why it cannot be simulated with these values: the
+        ValueError or ArithmeticError that `predict` raises. Raises MisuseError, naming trial and values, for any other
+        error of the model."""
         try:
-            return self.predict(theta, effects, trial, coarse=coarse, corrections=corrections)
+            return self.predict(theta, effects, trial, **how)
         except LacunaError:
             raise
         except (ValueError, ArithmeticError) as error:

@@ -13,7 +13,7 @@ from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.errors import listed
 from lacuna.estimation.fit import Fit, evaluate_on
-from lacuna.estimation.problem import LARGEST_STEP, Point, Problem
+from lacuna.estimation.problem import LARGEST_STEP, Point, Problem, in_parallel
 from lacuna.estimation.structure import is_learnt
 from lacuna.estimation.uncertainty import Estimate, pieces_of, uncertainty
 from lacuna.system import misshapen
@@ -133,25 +133,34 @@ def _edges(fitted: Fit) -> list[str]:
     may have stopped there. Close is a standard deviation, or as far as derivatives step, since a derivative with a
     failing step makes the standard deviation tiny."""
     problem, point, structure = fitted.problem, fitted.solution.point, fitted.structure
-    failing_here = failed(with_residuals([fitted]))
     lower, upper = structure.bounds(point.values)
-    found = []
+    ways: list[tuple[Estimate, int, np.ndarray]] = []
     for estimate, index in zip(uncertainty(fitted).estimates, fitted.solution.free, strict=True):
         scale = structure.parameters[index].step_scale
         far = np.clip(estimate.sd, LARGEST_STEP * scale, scale)
         for value in np.clip([estimate.value - far, estimate.value + far], lower[index], upper[index]):
-            if is_learnt(estimate.name) or value == estimate.value:
-                continue
-            moved = Point(np.where(np.arange(len(lower)) == index, value, point.values), point.nuisances)
-            predictions = problem.predict_all(moved)
-            failing = failed(zip(problem.trials, problem.scaled(predictions), strict=True))
-            if newly := [name for name in failing if name not in failing_here]:
-                stopped, there = (structure.system.told(estimate.name, v) for v in (estimate.value, value))
-                found.append(
-                    f"{estimate.name} = {_quantity(stopped, estimate.unit)} may be where the search had to stop, not"
-                    f" the best value: close by, at {there:.4g}, simulations fail, such as that of {newly[0]}"
-                    f" ({_cause(problem, moved, newly[0])})."
-                )
+            if not is_learnt(estimate.name) and value != estimate.value:
+                ways.append((estimate, index, np.where(np.arange(len(lower)) == index, value, point.values)))
+
+    def of_trial(i: int) -> np.ndarray:
+        """Which of the ways make a trial fail that can be simulated here, shape (n,)."""
+        moving = np.array([structure.moves(index, problem.trials[i]) for _, index, _ in ways], bool)
+        places = [point.values, *(values for (*_, values), moves in zip(ways, moving, strict=True) if moves)]
+        here, *there = problem.fails(i, [(values, point.nuisances[i]) for values in places])
+        moving[moving] = np.array(there, bool) & ~here
+        return moving
+
+    found = []
+    failing = np.array(in_parallel(of_trial, range(len(problem.trials)), problem.sizes)).T
+    for (estimate, index, values), trials in zip(ways, failing, strict=True):
+        if trials.any():
+            name = problem.trials[int(np.argmax(trials))].name
+            stopped, there = (structure.system.told(estimate.name, v) for v in (estimate.value, values[index]))
+            found.append(
+                f"{estimate.name} = {_quantity(stopped, estimate.unit)} may be where the search had to stop, not the"
+                f" best value: close by, at {there:.4g}, simulations fail, such as that of {name}"
+                f" ({_cause(problem, Point(values, point.nuisances), name)})."
+            )
     return found
 
 

@@ -279,6 +279,16 @@ class Problem:
             changes[away] = seen[1:] - seen[0]
         return changes
 
+    def fails(self, index: int, places: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+        """Mask, shape (n,), of the nearby `places` (values, nuisances) at which a trial cannot be predicted in full, or
+        diverges."""
+        samples, weighing = (
+            self._samples(self._simulate(places, index, coarse=False, alike=True), index),
+            self._weighing[index],
+        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            return ~(np.abs((samples - weighing.measured) * weighing.weight) <= _MAX_DEVIATION).all(axis=1)
+
     def scaled(self, predictions: Sequence[Channels]) -> list[Channels]:
         """(measured - predicted) / sd by trial and channel, neither compressed nor thinned; NaN where missing."""
         return [

@@ -121,9 +121,9 @@ def _derivatives(problem: Problem, solution: Solution, along: _Directions) -> li
         large = np.flatnonzero(size > _FALL)
         halfway = [tuple(0.5 * (a + b) for a, b in zip(here, places[k], strict=True)) for k in large]
         for k, half in zip(large, problem.changes(i, here, halfway) if halfway else (), strict=True):
-            if (half**2).sum() <= _FALL:
+            if (there := float(half @ half)) <= _FALL:
                 changes[k] = 2.0 * half
-            elif (half**2).sum() > 0.5 * size[k]:  # of a slope, a quarter
+            elif there > 0.5 * size[k]:  # of a slope, a quarter
                 changes[k] = solution.sensitivities[i].times(steps[k])
         own = changes[len(free) :] / spread[:, None]
         taken = np.vstack([back.T @ (changes[: len(free)] - follow.T @ own), own])
