@@ -211,6 +211,26 @@ def test_a_baseline_in_the_place_of_a_gait_is_called_so():
     assert speed_table([other]).rows[0][0] == "the base model's: the completed model has none"
 
 
+def test_the_lead_praises_only_gaits_that_were_found(monkeypatch):
+    given = sample.summary()
+    gaits = {gait["gait"]: gait for gait in given["gaits"]}
+    gaits["edge"] = gaits["completed"] | {"gait": "edge", "measured": 12.3}
+
+    def lead(without=(), **stand_ins):
+        shown = [one | {"stand_in": stand_ins.get(name)} for name, one in gaits.items() if name not in without]
+        monkeypatch.setattr(sample, "summary", lambda sealed: given | {"gaits": shown})
+        return sample.page().lead
+
+    fastest = f"The gait found with the completed model walks {gaits['completed']['measured']:.1f} mm/s"
+    assert fastest in lead()
+    assert "The gait found with the completed model walks 12.3 mm/s" in lead(completed="base")
+    none = "With the completed model, no gait was found with which enough robots walk."
+    assert none in lead(without=("edge",), completed="base")
+    assert "With the base model, no gait was found." in lead(base="baseline")
+    gaits["baseline"] |= {"measured": 0.2}
+    assert "mm/s, while the baseline stands still." in lead()
+
+
 VACUUM = "vacuum in 0.50 (body), 0.50 (head) and 0.50 (tail) of the cycle"
 
 
