@@ -41,7 +41,7 @@ def optimize(
     ] = True,
     edge: Annotated[
         bool,
-        typer.Option("--edge", help="Maximise the model's own speed, if 19 in 20 robots walk, as campaigns do."),
+        typer.Option("--edge", help="Maximise the mean speed, if 19 in 20 robots walk, as campaigns do."),
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Random seed of the search and of the sampled robots.")] = 0,
     evaluations: Annotated[

@@ -13,8 +13,10 @@ FAMILIES = (
     Gait(2.68, 168.0, 335.0, 0.666, 0.450, 0.450),  # the same with a later head, for lagging sensors
     Gait(2.70, 198.0, 86.0, 0.668, 0.730, 0.730),  # tail 85 degrees ahead, ends three quarters of the cycle at vacuum
     Gait(2.75, 205.5, 82.5, 0.676, 0.717, 0.717),  # a second optimum of that one, beyond a cliff
+    Gait(2.557, 220.3, 338.0, 0.6545, 0.457, 0.457),  # with the next: the first and the third at the edge of a fit
+    Gait(2.60, 199.0, 85.5, 0.655, 0.680, 0.680),
     Gait(3.20, 240.0, 356.0, 0.612, 0.484, 0.484),  # with the next: both, for choked valves (slow filling)
     Gait(3.20, 215.0, 102.0, 0.614, 0.640, 0.640),
 )
 # Relative changes of a family's period that are tried: robots differ in speed by a third.
-PERIODS = (0.0, 0.02, 0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.4)
+PERIODS = (-0.05, -0.025, 0.0, 0.02, 0.04, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3, 0.4)

@@ -1,19 +1,21 @@
-"""The objectives: speed on the model itself, or the speed that nearly every robot reaches, or the model's own among the
+"""The objectives: speed on the model itself, or the speed that nearly every robot reaches, or the mean speed among the
 gaits with which nearly every robot walks."""
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.pool import Simulations
-from bifa.gait.prediction import MIN_SPEED_RATIO
+from bifa.gait.prediction import FINE_M, MIN_SPEED_RATIO
 from bifa.gait.space import SearchSpace
 from bifa.simulate import Plant
 
 QUANTILE = 0.10
 _FIRST_DRAWS = 3
+_NEAR_BEST = 0.95  # of the best value: gaits slower than that on the model itself are not tried on typical robots
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0  # the fractional parts of its multiples are evenly spread, however many
 
 
@@ -39,7 +41,9 @@ class RobustSpeed:
 
     jitter: every draw walks all gaits slower or faster by a fixed fraction of its own within it. At the cliff the set
     of periods with which a robot walks is ragged, and a climb ends on the first spike; over draws that differ in period
-    narrower spikes average out. walking: count speeds by `as_walked`.
+    narrower spikes average out. typical: number of draws, besides the model itself, by whose mean speed those that
+    walk are counted (see `as_walked`); 0: every draw counts with its own speed. Few draws are typical, so these take
+    fine steps: next to a cliff there often are two ways of walking, 3 % apart, and coarse steps may find the wrong one.
     """
 
     def __init__(
@@ -52,11 +56,11 @@ class RobustSpeed:
         share: float = QUANTILE,
         abandon: float = 0.9,
         jitter: float = 0.0,
-        walking: bool = False,
+        typical: int = 0,
     ):
-        self._runs, self._space, self._draws, self._walking = runs, space, draws, walking
+        self._runs, self._space, self._draws, self._walking = runs, space, draws, typical > 0
         self._metric = metric.of_draws()
-        self._own = NominalSpeed(runs, nominal, space, self._metric)
+        self._nominal, self._typical, self._fine = nominal, draws[:typical], replace(metric, tolerance_m=FINE_M)
         self._rank = max(1, math.ceil(share * len(draws)))
         self._failures = np.zeros(len(draws))
         self._abandon, self._best = abandon, 0.0
@@ -68,7 +72,7 @@ class RobustSpeed:
         draws = len(self._draws)
         order = np.argsort(-self._failures, kind="stable")
         met = np.full((len(rows), draws), np.inf)
-        own = self._own(points)
+        own = self._mean_speed(rows)
         bound = own.copy()
         alive = np.flatnonzero(bound >= max(self._abandon * self._best, 1e-9))
         done, size = 0, _FIRST_DRAWS + self._rank
@@ -88,16 +92,32 @@ class RobustSpeed:
             alive = alive[~settled & (bound[alive] >= max(self._abandon * self._best, 1e-9))]
         return bound
 
+    def _mean_speed(self, rows: np.ndarray) -> np.ndarray:
+        own = distribution(self._runs, [self._nominal], rows, self._fine)
+        near = own[:, 0] >= max(_NEAR_BEST * self._best, 1e-9)
+        mean = own[:, 0]
+        if self._typical and near.any():
+            others = distribution(self._runs, self._typical, rows[near], self._fine)
+            mean[near] = mean_of_walking(np.hstack([own[near], others]))
+        return mean
+
     def _speeds(self, rows: np.ndarray, which: np.ndarray) -> np.ndarray:
         longer = self._longer[which]
         jittered = np.column_stack([rows[:, 0] * longer, rows[:, 1:]])
         return self._runs.judged(self._draws, which, jittered, self._metric).counted_mm_s * longer
 
 
-def as_walked(speeds_mm_s: np.ndarray, own_mm_s: np.ndarray | float) -> np.ndarray:
-    """Speeds of drawn robots, those that walk counted as the model's own: how fast each walks is no risk, that it may
-    fall is. Low quantiles are then the model's own speed, as long as enough robots walk."""
-    return np.where(speeds_mm_s >= MIN_SPEED_RATIO * own_mm_s, own_mm_s, speeds_mm_s)
+def as_walked(speeds_mm_s: np.ndarray, mean_mm_s: np.ndarray | float) -> np.ndarray:
+    """Speeds of drawn robots, those that walk counted as their mean: how fast each walks is no risk, that it may fall
+    is. Low quantiles are then the mean speed, as long as enough robots walk."""
+    return np.where(speeds_mm_s >= MIN_SPEED_RATIO * mean_mm_s, mean_mm_s, speeds_mm_s)
+
+
+def mean_of_walking(speeds_mm_s: np.ndarray) -> np.ndarray:
+    """Mean speed (n,) of those robots that walk, of speeds (n, robots): of those that reach `MIN_SPEED_RATIO` of the
+    median."""
+    walks = speeds_mm_s >= MIN_SPEED_RATIO * np.median(speeds_mm_s, axis=-1, keepdims=True)
+    return np.asarray(np.mean(speeds_mm_s, axis=-1, where=walks))
 
 
 def on_model(runs: Simulations, nominal: Plant, gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:

@@ -100,7 +100,7 @@ def test_the_edge_is_an_aim_of_its_own(runs, tmp_path, monkeypatch):
     assert invoke("optimize", *given).exit_code == 0
     assert [(one.at_edge, one.robust, one.share) for one in asked] == [(True, True, 0.05)]
     notes = tomllib.loads((tmp_path / "gait.toml").read_text())["provenance"]
-    assert notes["objective"] == "speed on the model itself, if 95 % of the robots walk"
+    assert notes["objective"] == "mean speed of the robots that walk, if 95 % do"
     refused = invoke("optimize", *given, "--nominal")
     assert refused.exit_code == 2
     assert "choose one of --edge and --nominal" in refused.output

@@ -15,7 +15,7 @@ _SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, doubled until enough
 _MIN_WALKING = 60
 BASIN_SPACING = 0.12  # distance on some axis of the unit cube that puts two starts in different basins
 _NEIGHBORS, _COMPARED = 8, 2000
-POPULATION = 12  # points per run and generation
+POPULATION = 12  # points per run and generation, if not told otherwise
 _CLIMBS = 5  # runs side by side, at first and in each restart
 _STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations in the unit cube: in any basin, and near its top
 TRIAL_GENERATIONS = 10  # generations after which a run far behind the best is abandoned
@@ -110,16 +110,17 @@ def climb_together(
     same: float = 0.0,
     trial: int = TRIAL_GENERATIONS,
     shapes: np.ndarray | None = None,
+    population: int = POPULATION,
 ) -> Ends:
     """Run CMA-ES from `starts` (n, dimensions), one generation of all runs per call; return the best point of each.
     A run that after `trial` generations is below `behind` of the best is abandoned. If `same` is not 0, all runs stop
     once two that have ended agree within it and no running one is ahead. shapes: of the initial distributions, as in
-    `Ends`; None: round."""
+    `Ends`; None: round. population: points per run and generation."""
     tops = np.array(starts, dtype=float)
     shapes = np.tile(np.eye(tops.shape[1]), (len(tops), 1, 1)) if shapes is None else shapes
     # Each run has coordinates of its own, in which its initial distribution is round.
     own = [np.linalg.solve(shape, start) for shape, start in zip(shapes, tops, strict=True)]
-    runs = [_strategy(*start, seed + k) for k, start in enumerate(zip(own, steps, strict=True))]
+    runs = [_strategy(*start, seed + k, population) for k, start in enumerate(zip(own, steps, strict=True))]
     bests: list[list[float]] = [[] for _ in runs]  # best value so far of each run, after every generation
     alive, spent = list(range(len(runs))), 0
     while alive and spent < evaluations:
@@ -152,7 +153,7 @@ def _shape(run: cma.CMAEvolutionStrategy) -> np.ndarray:
     return root / np.linalg.det(root) ** (1.0 / len(root))
 
 
-def _strategy(start: np.ndarray, step: float, seed: int) -> cma.CMAEvolutionStrategy:
+def _strategy(start: np.ndarray, step: float, seed: int, population: int) -> cma.CMAEvolutionStrategy:
     # The recorder folds points into the cube, so CMA-ES itself needs no bounds. To cma seed 0 means "from the clock".
-    options = {"seed": seed + 1, "popsize": POPULATION, "verbose": -9, "tolfun": 1e-3, "tolx": 1e-4}
+    options = {"seed": seed + 1, "popsize": population, "verbose": -9, "tolfun": 1e-3, "tolx": 1e-4}
     return cma.CMAEvolutionStrategy(np.asarray(start), step, options)

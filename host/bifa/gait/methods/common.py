@@ -80,6 +80,10 @@ class Evaluated:
         near = (self.values > 0.0) & (self.values >= share * self.values.max(initial=0.0))
         return Evaluated(self.points[near], self.values[near])
 
+    def shapes_near(self, points: np.ndarray, wraps: np.ndarray) -> np.ndarray | None:
+        """Shapes of the end points nearest to `points`, as in `Ends`; None without end points."""
+        return None if self.ends is None else self.ends.shapes_near(points, wraps)
+
     def finalists(
         self,
         count: int,
