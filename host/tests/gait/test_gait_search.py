@@ -9,6 +9,7 @@ from bifa.cluster import ClusterError
 from bifa.gait import Metric, SearchError, Settings, library, optimize, simulations
 from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.methods.common import Ends
+from bifa.gait.metric import Judged
 from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution, mean_of_walking
 from bifa.gait.prediction import FINE_M
 from bifa.gait.search import EXPLORE, VERIFYING_DRAWS, SearchRun, best_of_finalists, explore_on_robots
@@ -66,6 +67,36 @@ def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nomin
     again = objective(points[best][None])
     assert runs.count - before < 1 + len(draws), "the hardest robots are known now, and the easy ones are skipped"
     assert again == pytest.approx(exact[best], rel=0.01)
+
+
+class _SpeedsOf:
+    """Stands in for simulations: robot k walks with every gait of body duty d at `speeds_mm_s[d][k]`."""
+
+    def __init__(self, speeds_mm_s: dict[float, list[float]]):
+        self._speeds_mm_s = speeds_mm_s
+
+    def judged(self, plants, which, gaits, metric):
+        pairs = zip(gaits[:, 3], which, strict=True)
+        speeds = np.array([self._speeds_mm_s[round(float(duty), 3)][plants[k]] for duty, k in pairs])
+        return Judged(speeds, np.zeros(len(speeds), bool))
+
+
+def test_at_the_edge_the_typical_robots_decide_not_the_model_itself():
+    """With a ripple, or next to a cliff, the model itself may be fast where most robots are not."""
+    alike, lucky, falls = [25.0] * 9, [26.0] + [24.0] * 8, [26.0] * 7 + [0.0] * 2
+    gaits = [replace(ROBUST, duty_body=duty) for duty in (0.6, 0.65, 0.7)]
+    runs = _SpeedsOf({0.6: alike, 0.65: lucky, 0.7: falls})
+    among = (runs, 0, range(1, 9), SPACE, Metric(), 0.15)
+    values = RobustSpeed(*among, typical=4)(SPACE.nearest(gaits))
+    assert values[0] == pytest.approx(25.0)
+    assert values[1] == pytest.approx(24.4), "the mean of the model and four robots"
+    assert values[2] == 0.0, "two of eight fall, one may"
+    assert RobustSpeed(*among)(SPACE.nearest(gaits[1:2])) == 24.0, "elsewhere the slowest decide"
+
+
+def test_the_mean_speed_is_that_of_the_robots_that_walk():
+    speeds = np.array([[25.0, 24.0, 0.5, 26.0], [0.0, 0.0, 0.0, 25.0]])
+    np.testing.assert_allclose(mean_of_walking(speeds), [25.0, 6.25])
 
 
 def test_a_gait_that_walks_by_a_hair_of_its_period_does_not_count_where_periods_jitter(runs, nominal_plant):
