@@ -27,6 +27,7 @@ from lacuna.system import (
     Record,
     System,
     Theta,
+    check_hashable,
     middle_conditions,
     several,
 )
@@ -161,7 +162,10 @@ class FunctionSystem(System):
         if isinstance(spare, str) or not isinstance(spare, Iterable | None):
             raise DeclarationError(f"spare is a collection of conditions: write [{spare!r}].")
         self._experiments = several(experiments, CandidateExperiment)
-        self._spare = None if spare is None else frozenset(spare)
+        kept = None if spare is None else tuple(spare)
+        for condition in kept or ():
+            check_hashable("a spare condition", condition)
+        self._spare = None if kept is None else frozenset(kept)
 
     def __repr__(self) -> str:
         return f"System({self.name!r}, {len(self.parameters)} parameters, {len(self.effects)} effects)"

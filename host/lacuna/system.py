@@ -66,10 +66,7 @@ class Parameter:
     prior_from_trials: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            raise DeclarationError(
-                f"a parameter's name is {self.name!r}, which is a {type(self.name).__name__}, not text"
-            )
+        _check_text("a parameter's name", self.name)
         for what in ("value", "lower", "upper"):
             if not isinstance(given := getattr(self, what), Real):
                 raise DeclarationError(f"{self.name}: {what} is {given!r}, not a number")
@@ -115,6 +112,21 @@ def _is_number(given: Any) -> bool:
     return isinstance(given, Real) and bool(-np.inf < float(given) < np.inf)
 
 
+def _check_text(what: str, given: Any) -> None:
+    if not isinstance(given, str):
+        raise DeclarationError(f"{what} is {given!r:.60}, which is a {type(given).__name__}, not text")
+
+
+def check_hashable(what: str, given: Any) -> None:
+    """Raise DeclarationError if `given` cannot be the member of a set, as conditions have to."""
+    try:
+        hash(given)
+    except TypeError:
+        raise DeclarationError(
+            f"{what} is {given!r:.60}, a {type(given).__name__}: give text, a number or a tuple of them"
+        ) from None
+
+
 def several(given: Any, kind: type) -> tuple[Any, ...]:
     """Return `given`, one of `kind` or an iterable of them, as a tuple. Raises DeclarationError for anything else."""
     found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, kind) else (given,)
@@ -158,6 +170,7 @@ class Effect:
     apart: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        _check_text("an effect's name", self.name)
         for each in ("parameters", "own"):
             object.__setattr__(self, each, several(getattr(self, each), Parameter))
         for each in ("experiments", "freed_at", "apart"):
@@ -223,6 +236,9 @@ class Record:
     payload: Any = None
     inputs: Mapping[str, Any] = field(default_factory=dict)
     clock: str = ""
+
+    def __post_init__(self) -> None:
+        check_hashable(f"record {self.name}: its condition", self.condition)
 
     def __getitem__(self, name: str) -> Any:
         """Return an input, a measured channel, or `time_s`. Raises KeyError, listing what there is."""

@@ -265,6 +265,7 @@ REFUSED_DECLARATIONS = {
     r"curve 'loss\.left': choose another name, without a dot": {"curves": replace(LOSS, name="loss.left")},
     r"spare is a collection of conditions: write \['sweep 4 W'\]": {"spare": "sweep 4 W"},
     r"spare is a collection of conditions: write \[4\]": {"spare": 4},
+    r"a spare condition is \['sweep', 4\], a list: give text, a number or a tuple": {"spare": iter([["sweep", 4]])},
     "noise_time_s is seconds": {"noise_time_s": "slow"},
 } | {name: {"effects": Effect(name, BEND)} for name in NOT_IN_THETA}
 
@@ -342,6 +343,16 @@ def test_refuses_a_parameter_that_does_not_say_which_change_of_it_matters(bounds
 def test_refuses_a_parameter_whose_name_is_no_text():
     with pytest.raises(DeclarationError, match="a parameter's name is 1, which is a int, not text"):
         Parameter(1, "", 0.5, 0.0, 5.0)
+
+
+def test_refuses_an_effect_whose_name_is_no_text():
+    with pytest.raises(DeclarationError, match="an effect's name is None, which is a NoneType, not text"):
+        Effect(None, BEND)
+
+
+def test_refuses_a_record_whose_condition_cannot_be_compared():
+    with pytest.raises(DeclarationError, match=r"record first: its condition is \['sweep', 4\], a list: give text"):
+        Record("first", "heating", ["sweep", 4], np.arange(3.0), {"T_K": np.zeros(3)})
 
 
 UNBOUNDED = {"lower": -math.inf, "upper": math.inf}
