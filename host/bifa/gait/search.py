@@ -8,7 +8,7 @@ import numpy as np
 from bifa.errors import BifaError
 from bifa.gait.families import FAMILIES, PERIODS
 from bifa.gait.methods import METHODS, Evaluated
-from bifa.gait.methods.cma_es import BASIN_SPACING, POPULATION, TRIAL_GENERATIONS, basins, climb_basins, climb_together
+from bifa.gait.methods.cma_es import BASIN_SPACING, PATIENCE, POPULATION, Patience, basins, climb_basins, climb_together
 from bifa.gait.methods.common import Ends, Objective, OnEvaluated, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, as_walked, distribution, mean_of_walking, on_model
@@ -39,8 +39,9 @@ class RobustRound:
     draws: robots that each gait is evaluated on. quantile: of the speed, maximised. abandon: share of the best value
     below which a gait is abandoned. tolerance_m: of the integrator, per step. periods: relative changes of the period
     that the previous round's gaits are tried with. evaluations, step, climbs: budget, initial step and number of the
-    CMA-ES runs; trial: generations after which those below `abandon` of the best are abandoned. jitter: relative
-    variation of the period from robot to robot. typical: robots by whose mean speed gaits at the edge are ranked.
+    CMA-ES runs; trial: generations after which those below `abandon` of the best are abandoned; stall: generations
+    without a gain after which a run ends. jitter: relative variation of the period from robot to robot. typical: robots
+    by whose mean speed gaits at the edge are ranked.
     """
 
     draws: int
@@ -51,9 +52,15 @@ class RobustRound:
     evaluations: int = 0
     step: float = 0.0
     climbs: int = 1
-    trial: int = TRIAL_GENERATIONS
+    trial: int = PATIENCE.trial
+    stall: int = PATIENCE.stall
     jitter: float = 0.0
     typical: int = 0
+
+    @property
+    def patience(self) -> Patience:
+        """When a CMA-ES run of the round ends before its budget."""
+        return Patience(self.trial, self.abandon, self.stall)
 
 
 # Few robots while gaits differ widely, many once they hardly differ. The quantiles are below 10 %: a gait tuned until
@@ -62,7 +69,7 @@ EXPLORE = RobustRound(24, 0.08, 0.95, 1e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1400,
 # At the cliff tiny changes of the period decide. Few robots favour periods that are too short, and so do integration
 # errors: with one gait 99 % of the robots walked at steps of 30 um, 65 % at 10 um, 34 % at 3 um, 27 % at 1 um and less.
 _REFINE = RobustRound(
-    128, 0.0677, 0.98, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 480, 0.006, 3, 6, jitter=0.002, typical=8
+    128, 0.0677, 0.98, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 480, 0.006, 3, 6, 3, jitter=0.002, typical=8
 )
 # Changes, in s, of a gait's times that are tried between climbs: a climb ends at the first of many local optima.
 _LONGER_S: dict[str, tuple[float, ...]] = {name: (-0.1, -0.04, 0.04, 0.1) for name in TIMES}
@@ -310,7 +317,7 @@ def explore_on_robots(search: SearchRun, explored: Evaluated) -> Evaluated:
         return recorder.found()
     families = _tune_times(recorder, space, space.nearest(FAMILIES), PERIODS)
     known = list(families.near_best(_MIN_FAMILY_RATIO).finalists(_FAMILIES, _MIN_SPACING, wraps))
-    return climb_basins(recorder, wraps, budget, settings.seed, EXPLORE.step, known, EXPLORE.abandon)
+    return climb_basins(recorder, wraps, budget, settings.seed, EXPLORE.step, known, EXPLORE.patience)
 
 
 def _tune_times(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
@@ -376,7 +383,7 @@ def _climb_on(
     wraps, settings = search.settings.space.wraps, search.settings
     budget, steps = _scaled_budget(stage.evaluations, settings), [stage.step] * len(begun)
     shapes, seed = before.shapes_near(begun, wraps), settings.seed
-    return climb_together(recorder, begun, budget, seed, steps, stage.abandon, trial=stage.trial, shapes=shapes)
+    return climb_together(recorder, begun, budget, seed, steps, stage.patience, shapes=shapes)
 
 
 def _fastest_finalist(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:

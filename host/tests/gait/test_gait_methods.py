@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bifa.gait.methods import METHODS
-from bifa.gait.methods.cma_es import climb_basins, climb_together
+from bifa.gait.methods.cma_es import Patience, climb_basins, climb_together
 from bifa.gait.methods.common import Ends, Evaluated, RecordedObjective
 
 WRAPS = np.array([False, True, True, False, False])
@@ -152,7 +152,7 @@ def test_a_short_climb_on_other_robots_goes_on_with_the_shape_that_a_longer_one_
 
 def test_a_run_behind_is_abandoned_after_its_trial():
     recorder = RecordedObjective(two_basins, np.zeros(5, bool))
-    ends = climb_together(recorder, np.array([[0.7] * 5, [0.3] * 5]), 600, 0, [0.02, 0.02], trial=3)
+    ends = climb_together(recorder, np.array([[0.7] * 5, [0.3] * 5]), 600, 0, [0.02, 0.02], Patience(trial=3))
     assert ends.values[0] > 0.99
     other = np.abs(recorder.found().points - 0.3).max(axis=1) < 0.25
     assert np.count_nonzero(other) == 3 * 12

@@ -1,6 +1,7 @@
 """CMA-ES (Hansen; package `cma`) from several basins of a space-filling sample, until restarts agree."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cma
 import numpy as np
@@ -18,10 +19,30 @@ _NEIGHBORS, _COMPARED = 8, 2000
 POPULATION = 12  # points per run and generation, if not told otherwise
 _CLIMBS = 5  # runs side by side, at first and in each restart
 _STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations in the unit cube: in any basin, and near its top
-TRIAL_GENERATIONS = 10  # generations after which a run far behind the best is abandoned
-_ABANDON_RATIO = 0.9  # share of the best value below which a run is far behind
 _REL_TOL = 2.5e-3  # relative difference within which the best two runs agree
-_STALL_GENERATIONS, _MIN_GAIN = 10, 5e-4  # a run ends if it gains less than this fraction in so many generations
+_MIN_GAIN = 5e-4  # fraction: a run that gains less in some generations has stalled
+
+
+@dataclass(frozen=True)
+class Patience:
+    """When a run ends before its budget.
+
+    trial, behind: it is abandoned if after `trial` generations its value is below the share `behind` of the best.
+    stall: generations without a gain after which it ends.
+    """
+
+    trial: int = 10
+    behind: float = 0.9
+    stall: int = 10
+
+    def ends(self, bests: Sequence[float], best: float) -> bool:
+        """Whether a run ends, of its best values so far after every generation and the best of all runs."""
+        if len(bests) >= self.trial and bests[-1] < self.behind * best:
+            return True
+        return len(bests) > self.stall and bests[-1] - bests[-1 - self.stall] <= _MIN_GAIN * abs(bests[-1])
+
+
+PATIENCE = Patience()
 
 
 def cma_es(
@@ -45,7 +66,7 @@ def climb_basins(
     seed: int,
     step: float = _STEP,
     known: Sequence[np.ndarray] = (),
-    behind: float = _ABANDON_RATIO,
+    patience: Patience = PATIENCE,
     by_batch: bool = False,
 ) -> Evaluated:
     """Run CMA-ES from points `known` to be near local optima and from the best recorded basins, several runs at a time,
@@ -62,7 +83,7 @@ def climb_basins(
             break
         steps = [_NEAR_TOP] * len(known) + [step] * len(others)
         budget, run_seed = evaluations - recorder.count, seed + len(tried)
-        more = climb_together(recorder, starts, budget, run_seed, steps, behind, same)
+        more = climb_together(recorder, starts, budget, run_seed, steps, patience, same)
         compared = np.append(compared, more.values[: 1 if by_batch else None])
         ends, tried, known = ends.joined(more) if ends else more, [*tried, *others], ()
     return recorder.found(ends)
@@ -106,16 +127,14 @@ def climb_together(
     evaluations: int,
     seed: int,
     steps: Sequence[float],
-    behind: float = _ABANDON_RATIO,
+    patience: Patience = PATIENCE,
     same: float = 0.0,
-    trial: int = TRIAL_GENERATIONS,
     shapes: np.ndarray | None = None,
     population: int = POPULATION,
 ) -> Ends:
     """Run CMA-ES from `starts` (n, dimensions), one generation of all runs per call; return the best point of each.
-    A run that after `trial` generations is below `behind` of the best is abandoned. If `same` is not 0, all runs stop
-    once two that have ended agree within it and no running one is ahead. shapes: of the initial distributions, as in
-    `Ends`; None: round. population: points per run and generation."""
+    If `same` is not 0, all runs stop once two that have ended agree within it and no running one is ahead. shapes: of
+    the initial distributions, as in `Ends`; None: round. population: points per run and generation."""
     tops = np.array(starts, dtype=float)
     shapes = np.tile(np.eye(tops.shape[1]), (len(tops), 1, 1)) if shapes is None else shapes
     # Each run has coordinates of its own, in which its initial distribution is round.
@@ -134,18 +153,13 @@ def climb_together(
             bests[k].append(max([*bests[k][-1:], float(value.max())]))
         spent += sum(map(len, tried))
         best = max(one[-1] for one in bests)
-        behind_others = {k for k in alive if len(bests[k]) >= trial and bests[k][-1] < behind * best}
-        alive = [k for k in alive if not (k in behind_others or runs[k].stop() or _has_stalled(bests[k]))]
+        alive = [k for k in alive if not (runs[k].stop() or patience.ends(bests[k], best))]
         ended = sorted(one[-1] for k, one in enumerate(bests) if k not in alive)
         if same and len(ended) > 1 and agree([best, ended[-2]], same):
             break
     reached = np.array([one[-1] if one else 0.0 for one in bests])
     adapted = np.array([shape @ _shape(run) for shape, run in zip(shapes, runs, strict=True)])
     return Ends(tops, reached, adapted).ranked
-
-
-def _has_stalled(bests: Sequence[float]) -> bool:
-    return len(bests) > _STALL_GENERATIONS and bests[-1] - bests[-1 - _STALL_GENERATIONS] <= _MIN_GAIN * abs(bests[-1])
 
 
 def _shape(run: cma.CMAEvolutionStrategy) -> np.ndarray:
