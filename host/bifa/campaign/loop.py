@@ -152,9 +152,9 @@ def found_gait(
     walked: tuple[Gait, ...] = (),
     naive: bool = False,
 ) -> Optimum:
-    """Find the model's fastest gait with which 19 in 20 robots drawn from what is known walk (`spread` None), or the
-    fastest for nine in ten with the relative `spread`. The search also starts from the baseline and from the gaits
-    `walked` before."""
+    """Find the gait that is fastest on average among those with which 19 in 20 robots drawn from what is known walk
+    (`spread` None), or the fastest for nine in ten with the relative `spread`. The search also starts from the baseline
+    and from the gaits `walked` before."""
     settings = Settings(seed=seed, spread=spread, naive=naive, at_edge=spread is None, begin=(BASELINE, *walked))
     with simulations() as runs:
         return optimize(robot, runs, settings, lambda what, share, _: on_progress(what, share))

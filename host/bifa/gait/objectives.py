@@ -31,19 +31,20 @@ class NominalSpeed:
 
 
 class RobustSpeed:
-    """A low quantile, `share`, of the speed over drawn robots, limited by the speed on the model itself. All gaits are
-    evaluated on the same draws, by the metric's rules for draws.
+    """A low quantile, `share`, of the speed over drawn robots, limited by the speed on the model itself, or on typical
+    robots. All gaits are evaluated on the same draws, by the metric's rules for draws.
 
     Draws are simulated in batches. With n draws the quantile is the r-th smallest speed, r = ceil(share n), so the r-th
     smallest so far bounds it from above: a gait whose bound is below `abandon` of the best value is abandoned, with the
     bound as its value. Draws on which most gaits failed come first, and a gait is accepted once another batch no longer
-    lowers its bound (the remaining draws are easier).
+    lowers its bound (the remaining draws are easier). With typical robots a bound tells nothing until it breaks, so a
+    gait is accepted on all draws only.
 
     jitter: every draw walks all gaits slower or faster by a fixed fraction of its own within it. At the cliff the set
     of periods with which a robot walks is ragged, and a climb ends on the first spike; over draws that differ in period
     narrower spikes average out. typical: number of draws, besides the model itself, by whose mean speed those that
-    walk are counted (see `as_walked`); 0: every draw counts with its own speed. Few draws are typical, so these take
-    fine steps: next to a cliff there often are two ways of walking, 3 % apart, and coarse steps may find the wrong one.
+    walk are counted (see `as_walked`); 0: every draw counts with its own speed. The model and typical draws take fine
+    steps: next to a cliff there often are two ways of walking, 3 % apart, and coarse steps may find the wrong one.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class RobustSpeed:
         jitter: float = 0.0,
         typical: int = 0,
     ):
-        self._runs, self._space, self._draws, self._walking = runs, space, draws, typical > 0
+        self._runs, self._space, self._draws = runs, space, draws
         self._metric = metric.of_draws()
         self._nominal, self._typical, self._fine = nominal, draws[:typical], replace(metric, tolerance_m=FINE_M)
         self._rank = max(1, math.ceil(share * len(draws)))
@@ -72,16 +73,16 @@ class RobustSpeed:
         draws = len(self._draws)
         order = np.argsort(-self._failures, kind="stable")
         met = np.full((len(rows), draws), np.inf)
-        own = self._mean_speed(rows)
-        bound = own.copy()
+        limit = self._limit(rows)
+        bound = limit.copy()
         alive = np.flatnonzero(bound >= max(self._abandon * self._best, 1e-9))
         done, size = 0, _FIRST_DRAWS + self._rank
-        min_draws = size if self._failures.any() else draws  # draws before a batch may settle a gait
+        min_draws = size if self._failures.any() and not self._typical else draws  # before a batch may settle a gait
         while alive.size and done < draws:
             batch = order[done : done + size]
             gaits, which = np.repeat(alive, len(batch)), np.tile(batch, alive.size)
             speeds = self._speeds(rows[gaits], which)
-            met[gaits, which] = as_walked(speeds, own[gaits]) if self._walking else speeds
+            met[gaits, which] = as_walked(speeds, limit[gaits]) if self._typical else speeds
             done, size = done + len(batch), 2 * size
             slowest = np.partition(met[alive], self._rank - 1)[:, self._rank - 1]
             settled = (slowest >= bound[alive]) & (done > min_draws) | (done >= draws)
@@ -92,14 +93,14 @@ class RobustSpeed:
             alive = alive[~settled & (bound[alive] >= max(self._abandon * self._best, 1e-9))]
         return bound
 
-    def _mean_speed(self, rows: np.ndarray) -> np.ndarray:
+    def _limit(self, rows: np.ndarray) -> np.ndarray:
         own = distribution(self._runs, [self._nominal], rows, self._fine)
         near = own[:, 0] >= max(_NEAR_BEST * self._best, 1e-9)
-        mean = own[:, 0]
+        limit = own[:, 0].copy()
         if self._typical and near.any():
             others = distribution(self._runs, self._typical, rows[near], self._fine)
-            mean[near] = mean_of_walking(np.hstack([own[near], others]))
-        return mean
+            limit[near] = mean_of_walking(np.hstack([own[near], others]))
+        return limit
 
     def _speeds(self, rows: np.ndarray, which: np.ndarray) -> np.ndarray:
         longer = self._longer[which]
@@ -114,8 +115,8 @@ def as_walked(speeds_mm_s: np.ndarray, mean_mm_s: np.ndarray | float) -> np.ndar
 
 
 def mean_of_walking(speeds_mm_s: np.ndarray) -> np.ndarray:
-    """Mean speed (n,) of those robots that walk, of speeds (n, robots): of those that reach `MIN_SPEED_RATIO` of the
-    median."""
+    """Mean speed (n,) of those robots that walk, of speeds (n, robots): that reach `MIN_SPEED_RATIO` of the median.
+    Where most robots fall, none is told from another."""
     walks = speeds_mm_s >= MIN_SPEED_RATIO * np.median(speeds_mm_s, axis=-1, keepdims=True)
     return np.asarray(np.mean(speeds_mm_s, axis=-1, where=walks))
 

@@ -41,7 +41,7 @@ class RobustRound:
     that the previous round's gaits are tried with. evaluations, step, climbs: budget, initial step and number of the
     CMA-ES runs; trial: generations after which those below `abandon` of the best are abandoned; stall: generations
     without a gain after which a run ends. jitter: relative variation of the period from robot to robot. typical: robots
-    by whose mean speed gaits at the edge are ranked.
+    by whose mean speed, with the model's own, gaits at the edge are ranked.
     """
 
     draws: int
@@ -65,15 +65,16 @@ class RobustRound:
 
 # Few robots while gaits differ widely, many once they hardly differ. The quantiles are below 10 %: a gait tuned until
 # one in ten of its own robots fails would fail more often on others.
-EXPLORE = RobustRound(24, 0.08, 0.95, 1e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1400, 0.06, jitter=0.005, typical=3)
+EXPLORE = RobustRound(24, 0.08, 0.95, 1e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1000, 0.06, jitter=0.005, typical=3)
 # At the cliff tiny changes of the period decide. Few robots favour periods that are too short, and so do integration
 # errors: with one gait 99 % of the robots walked at steps of 30 um, 65 % at 10 um, 34 % at 3 um, 27 % at 1 um and less.
 _REFINE = RobustRound(
-    128, 0.0677, 0.98, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 480, 0.006, 3, 6, 3, jitter=0.002, typical=8
+    128, 0.0677, 0.98, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 480, 0.006, 3, trial=6, stall=4, jitter=0.002, typical=8
 )
 # Changes, in s, of a gait's times that are tried between climbs: a climb ends at the first of many local optima.
 _LONGER_S: dict[str, tuple[float, ...]] = {name: (-0.1, -0.04, 0.04, 0.1) for name in TIMES}
 _LONGER_S |= {"body_vacuum": (-0.12, -0.06, -0.03, 0.03, 0.06), "body_pressure": (-0.02, 0.02, 0.05, 0.1)}
+_CHANGES = sum(map(len, _LONGER_S.values()))
 # The last few thousandths: finalists differ less than 128 robots can tell.
 _FINISH = RobustRound(256, 0.08, 0.997, 3e-6, (0.0, 0.004, -0.004), 48, 0.002, jitter=0.001, typical=16)
 # Finalists are checked by the full metric: the quick one is lenient, and a gait that is best on some robots may fail
@@ -150,9 +151,9 @@ class Optimum:
     """The best gait found, with its predicted performance.
 
     nominal_mm_s: speed on the model itself, verified over 20 cycles with a finer step. speeds_mm_s: (n,) speeds on
-    `VERIFYING_DRAWS` robots that the search never used; quantile_mm_s: what was maximised, the speed that all but
-    `settings.share` of them reach (see `Settings.low_mm_s`). explored: everything the method evaluated. prediction: of
-    a walk with the gait.
+    `VERIFYING_DRAWS` robots that the search never used; quantile_mm_s: what was maximised of them, see `Settings.aim`.
+    evaluations: gaits that were tried before the finalists. explored: everything that the first round evaluated.
+    prediction: of a walk with the gait.
     """
 
     gait: Gait
@@ -255,13 +256,16 @@ def optimize(
     rules = settings.rules.quicker() if settings.robust else metric
     own = NominalSpeed(runs, plant(model), settings.space, rules)
     explored = _explore(search, own)
-    if settings.robust and explored.best_value > 0.0:
-        explored = explore_on_robots(search, explored)
+    tried = len(explored.values)
     if explored.best_value <= 0.0:
-        none = f"none of {len(explored.values)} gaits walks"
-        if settings.robust:
-            raise SearchError(f"{none} on enough of the drawn robots; narrow their spread, or widen the space")
-        raise SearchError(f"{none} without slipping; widen the space or search longer")
+        how = "on the model itself" if settings.robust else "without slipping"
+        raise SearchError(f"none of {tried} gaits walks {how}; widen the space or search longer")
+    if settings.robust:
+        explored = explore_on_robots(search, explored)
+        tried += len(explored.values)
+        if explored.best_value <= 0.0:
+            none = f"none of {tried} gaits walks on enough of the drawn robots"
+            raise SearchError(f"{none}; narrow their spread, or widen the space")
     if settings.robust:
         refined = _refine_on_robots(search, explored) if settings.refine else []
         gait, nominal = best_of_finalists(search, explored, [explored, *refined][-1])
@@ -278,7 +282,7 @@ def optimize(
         speeds,
         known,
         settings,
-        sum(len(found.values) for found in (explored, *refined)),
+        tried + sum(len(found.values) for found in refined),
         runs.count - started,
         explored,
         _predicted(search, gait, speeds),
@@ -307,12 +311,14 @@ def explore_on_robots(search: SearchRun, explored: Evaluated) -> Evaluated:
     """Run CMA-ES on a few robots, from gait families, the basins of the nominal speed, and `settings.begin`. Slower
     copies are tried too: the nominally fastest gaits are beyond the cliff of most robots, where the objective is 0."""
     settings, space, wraps = search.settings, search.settings.space, search.settings.space.wraps
-    budget = _scaled_budget(EXPLORE.evaluations, settings)
-    recorder = RecordedObjective(
-        search.objective(EXPLORE, 0), wraps, search.progress_callback("search on robots", budget)
-    )
     starts = np.vstack([space.nearest(settings.begin), basins(explored, wraps, _BASINS)])
-    recorder(np.concatenate(_at_periods(space, starts, EXPLORE.periods)))
+    copies = np.concatenate(_at_periods(space, starts, EXPLORE.periods))
+    budget = len(copies)
+    if settings.refine:
+        budget += _tunings(len(FAMILIES), PERIODS) + _scaled_budget(EXPLORE.evaluations, settings)
+    progress_callback = search.progress_callback("search on robots", budget)
+    recorder = RecordedObjective(search.objective(EXPLORE, 0), wraps, progress_callback)
+    recorder(copies)
     if not settings.refine:
         return recorder.found()
     families = _tune_times(recorder, space, space.nearest(FAMILIES), PERIODS)
@@ -328,6 +334,11 @@ def _tune_times(objective: Objective, space: SearchSpace, points: np.ndarray, pe
     retimed = [space.retimed(points, {name: by}) for name, each in _LONGER_S.items() for by in each]
     values = objective(np.concatenate([points, *retimed]))
     return _best_copies([points, *retimed], np.split(values, 1 + len(retimed)))
+
+
+def _tunings(points: int, periods: Sequence[float]) -> int:
+    """Evaluations that `_tune_times` takes for so many points."""
+    return points * (len(periods) + 1 + _CHANGES)
 
 
 def _best_copies(copies: Sequence[np.ndarray], values: Sequence[np.ndarray]) -> Evaluated:
@@ -366,7 +377,8 @@ def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]
     on few robots may be so by chance. Returns nothing if none of these points walks on them."""
     settings, wraps = search.settings, search.settings.space.wraps
     ended = explored.finalists(_STARTS, BASIN_SPACING, wraps) if explored.ends is None else explored.ends.points
-    budget = _scaled_budget(_REFINE.evaluations, settings)
+    ended = np.vstack([settings.space.nearest(settings.begin), ended])
+    budget = _tunings(len(ended), _REFINE.periods) + _scaled_budget(_REFINE.evaluations, settings)
     recorder = RecordedObjective(search.objective(_REFINE, 1), wraps, search.progress_callback("refine", budget))
     best = _tune_times(recorder, settings.space, ended, _REFINE.periods)
     begun = best.near_best(_MIN_END_RATIO).finalists(_REFINE.climbs, _RIDGE_SPACING, wraps)
@@ -418,6 +430,9 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
     # One call each: gaits worse than the best so far are evaluated on few robots only, the hardest first.
     for point in copies:
         recorder(point[None])
+    if recorder.best < _WALK_RATIO * refined.best_value:  # all of them fall on these robots
+        for point in np.concatenate(_at_periods(space, finalists, _SLOWER)):
+            recorder(point[None])
     if settings.refine and recorder.best > 0.0:
         _climb_on(search, _FINISH, recorder, recorder.found().best_point[None], refined)
     best, promised = recorder.found().finalists(_ROBUST_FINALISTS, apart=_MIN_SPACING), recorder.best

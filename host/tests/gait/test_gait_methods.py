@@ -155,7 +155,35 @@ def test_a_run_behind_is_abandoned_after_its_trial():
     ends = climb_together(recorder, np.array([[0.7] * 5, [0.3] * 5]), 600, 0, [0.02, 0.02], Patience(trial=3))
     assert ends.values[0] > 0.99
     other = np.abs(recorder.found().points - 0.3).max(axis=1) < 0.25
-    assert np.count_nonzero(other) == 3 * 12
+    assert np.count_nonzero(other) == 1 + 3 * 12, "the start and three generations"
+
+
+@pytest.mark.parametrize(("stall", "generations"), [(2, 2), (4, 4)])
+def test_a_run_that_gains_nothing_ends_at_its_start(stall, generations):
+    """A spike where it begins: all that it tries is worse, and the start is not forgotten."""
+    start = np.full((1, 5), 0.4)
+
+    def spike(points):
+        return np.where((points == start).all(axis=1), 2.0, 1.0 - ((points - 0.6) ** 2).sum(axis=1))
+
+    recorder = RecordedObjective(spike, np.zeros(5, bool))
+    ends = climb_together(recorder, start, 600, 0, [0.02], Patience(stall=stall))
+    assert recorder.count == 1 + generations * 12
+    assert ends.values[0] == 2.0
+    np.testing.assert_array_equal(ends.points, start)
+
+
+def test_a_search_neither_uses_nor_changes_numpys_global_generator():
+    """Others in the process may use it meanwhile: the same seed gives the same gait nonetheless."""
+
+    def sought(seed_of_others):
+        np.random.seed(seed_of_others)
+        found = METHODS["cma"](two_basins, np.zeros(5, bool), 600, 3)
+        return found.best_point, np.random.random()
+
+    (first, drawn), (second, _) = sought(1), sought(2)
+    np.testing.assert_array_equal(first, second)
+    assert drawn == np.random.RandomState(1).random()
 
 
 def test_the_shape_is_that_of_the_nearest_run_also_the_other_way_round():

@@ -36,8 +36,8 @@ class Patience:
     stall: int = 10
 
     def ends(self, bests: Sequence[float], best: float) -> bool:
-        """Whether a run ends, of its best values so far after every generation and the best of all runs."""
-        if len(bests) >= self.trial and bests[-1] < self.behind * best:
+        """Whether a run ends, of its best values at the start and after every generation, and the best of all runs."""
+        if len(bests) > self.trial and bests[-1] < self.behind * best:
             return True
         return len(bests) > self.stall and bests[-1] - bests[-1 - self.stall] <= _MIN_GAIN * abs(bests[-1])
 
@@ -132,7 +132,8 @@ def climb_together(
     shapes: np.ndarray | None = None,
     population: int = POPULATION,
 ) -> Ends:
-    """Run CMA-ES from `starts` (n, dimensions), one generation of all runs per call; return the best point of each.
+    """Run CMA-ES from `starts` (n, dimensions), one generation of all runs per call; return the best point of each,
+    the start included.
     If `same` is not 0, all runs stop once two that have ended agree within it and no running one is ahead. shapes: of
     the initial distributions, as in `Ends`; None: round. population: points per run and generation."""
     tops = np.array(starts, dtype=float)
@@ -140,7 +141,7 @@ def climb_together(
     # Each run has coordinates of its own, in which its initial distribution is round.
     own = [np.linalg.solve(shape, start) for shape, start in zip(shapes, tops, strict=True)]
     runs = [_strategy(*start, seed + k, population) for k, start in enumerate(zip(own, steps, strict=True))]
-    bests: list[list[float]] = [[] for _ in runs]  # best value so far of each run, after every generation
+    bests = [[float(value)] for value in recorder(tops)]  # best value so far of each run, after every generation
     alive, spent = list(range(len(runs))), 0
     while alive and spent < evaluations:
         asked = [runs[k].ask() for k in alive]
@@ -148,16 +149,16 @@ def climb_together(
         values = np.split(recorder(np.concatenate(tried)), np.cumsum([len(one) for one in tried])[:-1])
         for k, one, points, value in zip(alive, asked, tried, values, strict=True):
             runs[k].tell(one, (-value).tolist())
-            if not bests[k] or value.max() > bests[k][-1]:
+            if value.max() > bests[k][-1]:
                 tops[k] = folded(points[int(np.argmax(value))], recorder.wraps)
-            bests[k].append(max([*bests[k][-1:], float(value.max())]))
+            bests[k].append(max(bests[k][-1], float(value.max())))
         spent += sum(map(len, tried))
         best = max(one[-1] for one in bests)
         alive = [k for k in alive if not (runs[k].stop() or patience.ends(bests[k], best))]
         ended = sorted(one[-1] for k, one in enumerate(bests) if k not in alive)
         if same and len(ended) > 1 and agree([best, ended[-2]], same):
             break
-    reached = np.array([one[-1] if one else 0.0 for one in bests])
+    reached = np.array([one[-1] for one in bests])
     adapted = np.array([shape @ _shape(run) for shape, run in zip(shapes, runs, strict=True)])
     return Ends(tops, reached, adapted).ranked
 
@@ -168,6 +169,9 @@ def _shape(run: cma.CMAEvolutionStrategy) -> np.ndarray:
 
 
 def _strategy(start: np.ndarray, step: float, seed: int, population: int) -> cma.CMAEvolutionStrategy:
-    # The recorder folds points into the cube, so CMA-ES itself needs no bounds. To cma seed 0 means "from the clock".
-    options = {"seed": seed + 1, "popsize": population, "verbose": -9, "tolfun": 1e-3, "tolx": 1e-4}
+    # The recorder folds points into the cube, so CMA-ES itself needs no bounds. A generator of its own for each run:
+    # with a seed, cma would seed and use numpy's global one.
+    rng = np.random.default_rng(seed)
+    own = {"seed": np.nan, "randn": lambda *size: rng.standard_normal(size)}
+    options = {**own, "popsize": population, "verbose": -9, "tolfun": 1e-3, "tolx": 1e-4}
     return cma.CMAEvolutionStrategy(np.asarray(start), step, options)
