@@ -69,7 +69,7 @@ EXPLORE = RobustRound(24, 0.08, 0.95, 1e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1000,
 # At the cliff tiny changes of the period decide. Few robots favour periods that are too short, and so do integration
 # errors: with one gait 99 % of the robots walked at steps of 30 um, 65 % at 10 um, 34 % at 3 um, 27 % at 1 um and less.
 _REFINE = RobustRound(
-    128, 0.0677, 0.98, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 480, 0.006, 3, trial=6, stall=4, jitter=0.002, typical=8
+    128, 0.0677, 0.98, 3e-6, (0.0, 0.01, 0.02, 0.04, -0.01), 400, 0.006, 3, trial=6, stall=3, jitter=0.002, typical=8
 )
 # Changes, in s, of a gait's times that are tried between climbs: a climb ends at the first of many local optima.
 _LONGER_S: dict[str, tuple[float, ...]] = {name: (-0.1, -0.04, 0.04, 0.1) for name in TIMES}
