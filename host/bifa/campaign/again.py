@@ -182,20 +182,21 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, steps: RoundSteps) -> N
     while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
-        completed = steps.complete(dataset, model)
+        file, folder = (outputs / "rounds" / name for name in (f"model-{number}.toml", f"walks-{number}"))
+        # Neither fitted nor sought again once it has begun to walk: elsewhere both may end a digit away.
+        gait = _walked_in(folder) or _walked_in(partial_of(folder))
+        completed = load_model(file) if gait and file.exists() else steps.complete(dataset, model)
         # If no effect is left, the fits have gone wrong: the model that explained the bench data is kept.
         if model.effects and not completed.effects:
             completed = model
-        folder = outputs / "rounds" / f"walks-{number}"
-        # not sought again if it has begun to walk: elsewhere the search may end a digit away
-        gait = _walked_in(folder) or _walked_in(partial_of(folder)) or steps.optimize(completed, (*began, *found))
+        gait = gait or steps.optimize(completed, (*began, *found))
         if gait is None:
             ended = Ending.FALLS
             break
+        save_model(file, completed)
         walks = read_dataset(folder) if folder.exists() else steps.walk(number, completed, gait, folder)
         found.append(gait)
         model = completed
-        save_model(outputs / "rounds" / f"model-{number}.toml", model)
         rounds.append(judged(model, walks, at_edge=True))
     rounds[-1] = replace(rounds[-1], ended=ended)
     save_model(outputs / "model-last.toml", model)

@@ -10,14 +10,13 @@ from typing import Any
 
 from bifa.campaign.again import RoundSteps, again
 from bifa.campaign.before_and_after import prediction_errors, residuals
-from bifa.campaign.resolve import joined, resolve
+from bifa.campaign.resolve import finished, joined, resolve
 from bifa.campaign.setup import Effort, Setup, about
 from bifa.campaign.stages import OnProgress, Stage
 from bifa.campaign.summary import summarize
 from bifa.campaign.walks import measure_walks, planned_cycles
 from bifa.data import Dataset, read_dataset, write_dataset
 from bifa.data.dataset import labels_of
-from bifa.files import is_stray
 from bifa.gait import Optimum, SearchError, Settings, optimize, simulations
 from bifa.gait.library.scenarios import provenance
 from bifa.gait.uncertainty import SPREAD
@@ -34,6 +33,7 @@ from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 from lacuna.diagnosis.diagnose import Diagnosis, diagnose
 from lacuna.diagnosis.next_experiment import NextExperiment
 from lacuna.diagnosis.record import as_record
+from lacuna.diagnosis.workers import STOPPED
 
 BENCH_NAME = "campaign: characterisation"  # name of the data set `bench`
 _MIN_WALK_PROBABILITY = 0.5  # gaits at the edge with a lower probability of walking are not tried
@@ -217,9 +217,10 @@ def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: 
         known = refitted(dataset, model, setup.seed, lambda what: on_progress(spoken(what), 0.0))
         if known:
             return known
-        return completed_model(
-            _run_diagnosis(setup, on_progress, dataset, tuple(model.effects), before_fit(model)).told
-        )
+        found = _run_diagnosis(setup, on_progress, dataset, tuple(model.effects), before_fit(model))
+        if STOPPED in found.warnings:  # a round leaves no record of it: the stage is resumed or begun again instead
+            raise KeyboardInterrupt
+        return completed_model(found.told)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
@@ -229,8 +230,8 @@ def _feed_back(setup: Setup, effort: Effort, on_progress: OnProgress, on_trial: 
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
-        for folder in sorted(path for path in (inputs / "separating").iterdir() if not is_stray(path.name)):
-            dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
+        for name in finished(inputs / "separating"):
+            dataset = joined(dataset, read_dataset(inputs / "separating" / name), f"{name}_")
         steps = RoundSteps(complete, lambda robot, walked: gait_at_edge(robot, setup.seed, on_progress, walked), walk)
         again(inputs, outputs, dataset, steps)
 

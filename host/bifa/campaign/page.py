@@ -36,7 +36,7 @@ GAIT_NAMES = {
     "completed": "found with the completed model",
 }
 ERROR_COLUMNS = ("base model", "completed model", "noise floor")
-_NAMES = GAIT_NAMES | {"edge": "at the edge of what is known"}
+WALKED_NAMES = GAIT_NAMES | {"edge": "at the edge of what is known"}
 _STAND_INS = {"baseline": "baseline", "base": "the base model's"}
 FILES = (
     ("bench/dataset.toml", "data set"),
@@ -257,16 +257,17 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
     return ChartedSection("Gaits that were not fitted", said, [PageTable(columns, rows, caption)])
 
 
-def _gait_name(gait: Mapping[str, Any]) -> str:
+def gait_name(gait: Mapping[str, Any]) -> str:
+    """A gait of summary.json in words, or what was walked in its stead."""
     stand_in = gait.get("stand_in")
-    return f"{_STAND_INS[stand_in]}: the {gait['gait']} model has none" if stand_in else _NAMES[gait["gait"]]
+    return f"{_STAND_INS[stand_in]}: the {gait['gait']} model has none" if stand_in else WALKED_NAMES[gait["gait"]]
 
 
 def speed_table(gaits: Sequence[Mapping[str, Any]]) -> PageTable:
     """Table of the predicted and measured speeds of the gaits."""
     rows = [
         [
-            _gait_name(gait),
+            gait_name(gait),
             f"{gait['base_model']:.2f}",
             f"{gait['completed_model']:.2f} {_interval(gait)}",
             f"{gait['measured']:.2f}{NBSP}±{NBSP}{gait['spread']:.2f}",

@@ -17,6 +17,7 @@ from lacuna.diagnosis.next_experiment import NextExperiment
 ROUNDS = 3
 SPECIMEN = ("sealed", "profile", "effects", "parameters")  # options of a virtual rig that determine which robot it is
 _WALK_CYCLES = 4
+_MOVE_AWAY = "move it away, to keep it, and run the command again"
 
 
 def resolve(
@@ -32,7 +33,8 @@ def resolve(
     `ROUNDS` times. This ends when one explanation is left or no available experiment separates them.
 
     open_rig(n) opens the rig for experiment n, counted from 1; its data set goes to `folder`/separate-n. One that is
-    there, from a run that was interrupted, is not measured again.
+    there, from a run that was interrupted, is not measured again. Raises DatasetError if it holds other trials than are
+    asked for now, as with a newer version.
     diagnose(dataset, suspected): `suspected` are the effects named before and those they were confused with. Returns
     all trials as one data set, the last diagnosis, and the experiments that were run.
     """
@@ -53,9 +55,16 @@ def resolve(
                     record=record,
                     on_event=lambda e: on_progress(e.planned.title, (e.number - 1 + e.share) / e.total),
                 )
-        dataset = joined(dataset, read_dataset(target), f"{target.name}_")
+        measured = read_dataset(target)
+        if {trial.condition for trial in measured.trials} != {
+            trial.as_trial().condition for trial in planned(found.next)
+        }:
+            raise DatasetError(f"{target} holds other trials than this diagnosis asks for: {_MOVE_AWAY}")
+        dataset = joined(dataset, measured, f"{target.name}_")
         ran.append(found.next)
         found = diagnose(dataset, {*found.next.separates, *(effect.name for effect in found.effects)})
+    if left := finished(folder)[len(ran) :]:
+        raise DatasetError(f"{folder} holds {', '.join(left)}, which this diagnosis does not ask for: {_MOVE_AWAY}")
     return dataset, found, tuple(ran)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bifa.campaign.page import ERROR_COLUMNS, GAIT_NAMES, errors_in_words
+from bifa.campaign.page import ERROR_COLUMNS, GAIT_NAMES, WALKED_NAMES, errors_in_words, gait_name
 from bifa.campaign.stages import changed_inputs
 from bifa.errors import BifaError
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
@@ -30,7 +30,7 @@ from bifa.robot import Model, load_model
 from bifa.robot.gait import Gait, load_gait
 from bifa.robot.parameters import ModelParameter
 
-_SHADES = {"baseline": "quiet", "base": "before", "completed": "after"}
+_SHADES = {"baseline": "quiet", "base": "before", "completed": "after", "edge": "ink"}
 _NEEDED = {"verdict", "effects", "remainder", "gaits", "prediction_error", "error"}  # of summary.json
 _APART = 2.0  # standard deviations: parameters that differ by more are marked
 
@@ -107,8 +107,9 @@ def compare_page(runs: Sequence[Campaign]) -> Page:
 def _lead(runs: Sequence[Campaign]) -> str:
     found = {run.name: {effect["name"] for effect in run.summary["effects"]} for run in runs}
     shared = set.intersection(*found.values())
-    speed, gait, where = max((_speed(run, gait), gait, run.name) for run in runs for gait in GAIT_NAMES)
-    walks = f"The fastest gait ({GAIT_NAMES[gait]}) walks {speed:.2f} mm/s, in {where}."
+    every = [(gait, run.name) for run in runs for gait in run.summary["gaits"]]
+    gait, where = max(every, key=lambda one: one[0]["measured"])
+    walks = f"The fastest gait ({gait_name(gait)}) walks {gait['measured']:.2f} mm/s, in {where}."
     if not any(found.values()):
         return f"None of them named an effect. {walks}"
     if all(names == shared for names in found.values()):
@@ -122,8 +123,10 @@ def _names(effects: Iterable[str]) -> str:
     return " and ".join(effect_words(name) for name in sorted(effects))
 
 
-def _speed(run: Campaign, gait: str) -> float:
-    return next(g["measured"] for g in run.summary["gaits"] if g["gait"] == gait)
+def _speeds_of(runs: Sequence[Campaign]) -> dict[str, list[float | None]]:
+    """Measured speeds of each gait that was walked in any of the campaigns, None where it was not."""
+    walked = [{gait["gait"]: gait["measured"] for gait in run.summary["gaits"]} for run in runs]
+    return {gait: [one.get(gait) for one in walked] for gait in WALKED_NAMES if any(gait in one for one in walked)}
 
 
 def verdict_table(runs: Sequence[Campaign]) -> PageTable:
@@ -137,8 +140,10 @@ def verdict_table(runs: Sequence[Campaign]) -> PageTable:
 
 def speed_table(runs: Sequence[Campaign]) -> PageTable:
     """Table of the gaits' measured speeds."""
-    rows = [[run.name, *(f"{_speed(run, gait):.2f}" for gait in GAIT_NAMES)] for run in runs]
-    return PageTable(["measured speed, mm/s", *GAIT_NAMES.values()], rows)
+    speeds = _speeds_of(runs)
+    cells = [["not walked" if speed is None else f"{speed:.2f}" for speed in each] for each in speeds.values()]
+    rows = [[run.name, *row] for run, row in zip(runs, zip(*cells, strict=True), strict=True)]
+    return PageTable(["measured speed, mm/s", *(WALKED_NAMES[gait] for gait in speeds)], rows)
 
 
 def error_table(runs: Sequence[Campaign]) -> PageTable:
@@ -193,9 +198,11 @@ def _errors(runs: Sequence[Campaign]) -> Chart:
 
 def _speeds(runs: Sequence[Campaign]) -> Chart:
     rows = np.arange(len(runs), 0, -1, dtype=float)
+    speeds = {gait: np.array(each, dtype=float) for gait, each in _speeds_of(runs).items()}
+    walked = {gait: np.isfinite(each) for gait, each in speeds.items()}
     series = [
-        Series((GAIT_NAMES[gait],), np.array([_speed(run, gait) for run in runs]), rows, shade, "dots")
-        for gait, shade in _SHADES.items()
+        Series((WALKED_NAMES[gait],), each[walked[gait]], rows[walked[gait]], _SHADES[gait], "dots")
+        for gait, each in speeds.items()
     ]
     top = max(float(s.x.max()) for s in series)
     panel = Panel(
@@ -204,5 +211,5 @@ def _speeds(runs: Sequence[Campaign]) -> Chart:
         Axis(range=(0.4, len(runs) + 0.6), ticks=dict(zip([r.name for r in runs], rows.tolist(), strict=True))),
         height=0.3 * len(runs) + 0.2,
     )
-    keys = [Key(GAIT_NAMES[gait], shade, "dots") for gait, shade in _SHADES.items()]
+    keys = [Key(WALKED_NAMES[gait], _SHADES[gait], "dots") for gait in speeds]
     return Chart([Column([panel])], keys, "Measured speed of each gait in each campaign", across=1)

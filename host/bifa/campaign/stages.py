@@ -232,7 +232,8 @@ def _resumed(scratch: Path, stage: Stage, request: dict[str, Any]) -> dict[str, 
         held = f"holds {counted(trials, 'trial')} of the stage {stage.name}, begun"
         raise StageError(
             f"{scratch} {held if trials else 'was begun'} with {', '.join(differing)}: resume with the original "
-            "settings, or choose another folder for a new campaign (both are then kept)"
+            "settings and version, move it away to begin this stage again, or choose another folder for a new campaign "
+            "(both are then kept)"
         )
     return begun
 

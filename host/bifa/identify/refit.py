@@ -14,7 +14,7 @@ def refitted(
     dataset: Dataset, model: Model, seed: int = 0, on_progress: Callable[[str], None] = lambda _: None
 ) -> Model | None:
     """Return `model` fitted to `dataset`, which holds the trials that it was fitted to and more; None if it then leaves
-    something that matters, or has learnt curves: the data then call for a diagnosis."""
+    something that matters, or has learnt curves in its equations: the data then call for a diagnosis."""
     if model.learnt:
         return None
     system = prepare(dataset, before_fit(model))

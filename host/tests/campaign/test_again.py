@@ -184,8 +184,14 @@ def test_rounds_that_an_interrupted_run_has_walked_are_neither_sought_nor_walked
     rounds = folders[1] / "rounds"
     rounds.mkdir()
     write_dataset(rounds / "walks-2", walked({"round-2": FASTER}, 2))
-    steps = RoundSteps(lambda dataset, suspected: ROBOT, lambda model, walked: None, fall)
+    steps = RoundSteps(Mock(return_value=ROBOT), lambda model, walked: None, fall)
     assert [Gait(**one["gait"]) for one in rounds_of(folders, ROBOT, steps)] == [FAST, FASTER]
+    steps.complete.assert_called_once()
+    save_model(rounds / "model-2.toml", SLIPPERY)
+    unfit = RoundSteps(Mock(side_effect=[ROBOT]), lambda model, walked: None, fall)
+    rounds_of(folders, ROBOT, unfit)
+    assert all(len(call.args[0].trials) > 6 for call in unfit.complete.call_args_list), "no fit for a gait that walked"
+    assert load_model(rounds / "model-2.toml")["mu_k"] == pytest.approx(SLIPPERY["mu_k"])
 
 
 @pytest.mark.parametrize(("probability", "gait"), [(0.97, FASTER), (0.16, None), (None, None)])

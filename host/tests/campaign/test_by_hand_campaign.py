@@ -26,6 +26,7 @@ from bifa.robot import nominal, save_model
 from bifa.robot.gait import BASELINE, Gait, save_gait
 from bifa.simulate import walk
 from harness.exports import EXPORTS
+from lacuna.diagnosis.workers import STOPPED
 
 pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 HOST = Path(__file__).parents[2]
@@ -180,7 +181,7 @@ def walks(lab, folder, said, stop_at=None):
 
 def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, monkeypatch):
     slightly = ROBOT.with_effects({"hysteresis": {"force_N": 1e-9}})
-    diagnosed = Mock(return_value=SimpleNamespace(told=slightly))
+    diagnosed = Mock(return_value=SimpleNamespace(told=slightly, warnings=()))
     monkeypatch.setattr(loop, "refitted", lambda *_: None)
     monkeypatch.setattr(loop, "prepare", lambda dataset, begin: dataset)
     monkeypatch.setattr(loop, "diagnose", diagnosed)
@@ -195,7 +196,10 @@ def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, mon
         walks(lab, folder, first, stop_at="Trial 2 of 2")
     assert not (folder / "walks-base").exists()
 
-    said = []
+    diagnosed.side_effect = [SimpleNamespace(told=slightly, warnings=(STOPPED,)), diagnosed.return_value]
+    with pytest.raises(KeyboardInterrupt):  # no gait is sought with what a search had found when it was stopped
+        walks(lab, folder, said := [])
+    assert (folder / "walks-completed").exists()
     walks(lab, folder, said)
     announced = [line.split(",")[0].strip() for line in said if line.strip().startswith("Trial")]
     assert announced == ["Trial 2 of 2: walk", "Trial 1 of 1: walk", "Trial 1 of 1: walk"]
@@ -211,7 +215,7 @@ def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, mon
     assert {Gait(**trial.gait) for trial in read_dataset(folder / "walks-base").trials} == {BASELINE, BRISK}
 
     rounds = json.loads((folder / "rounds.json").read_text())
-    fed = [{trial.file for trial in call.args[0].trials} for call in diagnosed.call_args_list]
+    fed = [{trial.file for trial in call.args[0].trials} for call in diagnosed.call_args_list[1:]]
     assert fed == [{"walk_1.csv", "walks-1/base_1.csv", "walks-1/completed_1.csv"}]
     assert [(Gait(**one["gait"]), one["effects"]) for one in rounds] == [(FAST, []), (FASTER, ["hysteresis"])]
     assert rounds[0]["error_mm"] > 1.5 * rounds[1]["error_mm"]

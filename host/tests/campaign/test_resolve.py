@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from bifa.campaign.resolve import ROUNDS, joined, planned, resolve
 from bifa.cli import app
-from bifa.data import Dataset, write_dataset
+from bifa.data import Dataset, DatasetError, write_dataset
 from bifa.measure.plan import PlannedTrial
 from bifa.rig import RigError, open_rig
 from bifa.robot.gait import BASELINE
@@ -60,6 +60,8 @@ def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
     )  # named effects are suspected again
     assert [t.actuator for t in dataset.trials] == ["small"] * 3
     assert dataset.trials[0].columns["displacement_mm"].max() > 25.0
+    resumed, *_ = resolve(DAY, SimpleNamespace(next=SEPARATING, effects=()), diagnose, Mock(), tmp_path)
+    assert [t.file for t in resumed.trials] == [t.file for t in dataset.trials], "not measured again"
 
 
 def test_an_experiment_that_an_interrupted_run_has_measured_is_not_measured_again(tmp_path):
@@ -71,6 +73,16 @@ def test_an_experiment_that_an_interrupted_run_has_measured_is_not_measured_agai
         DAY, SimpleNamespace(next=SEPARATING, effects=()), lambda *_: resolved, rigs, tmp_path
     )
     assert (len(dataset.trials), found, ran) == (3, resolved, (SEPARATING,))
+
+
+def test_an_experiment_left_by_another_diagnosis_is_not_taken_for_the_one_asked_for(tmp_path):
+    """As after an upgrade: the newer version may ask for another one, or for none."""
+    trials = tuple(replace(p.as_trial(session_order=k + 1), columns=PULL) for k, p in enumerate(planned(SEPARATING)))
+    write_dataset(tmp_path / "separate-1", Dataset(None, "to tell them apart", {}, trials))
+    other = replace(SEPARATING, settings=dict(SEPARATING.settings) | {"rate_mm_s": 60.0})
+    for asked, said in ((other, "separate-1 holds other trials"), (NextExperiment(), "holds separate-1, which")):
+        with pytest.raises(DatasetError, match=f"{said} .*move it away"):
+            resolve(DAY, SimpleNamespace(next=asked, effects=()), Mock(), Mock(), tmp_path)
 
 
 @pytest.fixture

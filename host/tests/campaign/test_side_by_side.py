@@ -8,7 +8,14 @@ import pytest
 from typer.testing import CliRunner
 
 from bifa.campaign.page import GAIT_NAMES
-from bifa.campaign.side_by_side import CompareError, compare_page, parameter_table, read_runs, verdict_table
+from bifa.campaign.side_by_side import (
+    CompareError,
+    compare_page,
+    parameter_table,
+    read_runs,
+    speed_table,
+    verdict_table,
+)
 from bifa.campaign.stages import PROVENANCE, digest
 from bifa.cli import app
 from bifa.report.page import render
@@ -35,6 +42,23 @@ def test_equal_campaigns_are_said_to_agree_and_the_fastest_gait_is_that_of_all_t
     gaits = runs[1].summary["gaits"]
     gaits[1]["measured"] = 22.814
     assert f"({GAIT_NAMES[gaits[1]['gait']]}) walks 22.81 mm/s, in b" in compare_page(runs).lead
+
+
+def test_gaits_at_the_edge_and_stand_ins_are_compared_as_well(tmp_path):
+    """The edge of what is known is where the fastest gait is; not every campaign has walked there."""
+    runs = read_runs([sample.finished(tmp_path / "a"), sample.finished(tmp_path / "b")])
+    for run in runs:
+        run.summary["gaits"][:] = [gait for gait in run.summary["gaits"] if gait["gait"] != "edge"]
+    runs[0].summary["gaits"].append(runs[0].summary["gaits"][-1] | {"gait": "edge", "measured": 26.0})
+    page = compare_page(runs)
+    assert "(at the edge of what is known) walks 26.00 mm/s, in a" in page.lead
+    table = speed_table(runs)
+    assert table.columns[-1] == "at the edge of what is known"
+    assert [row[-1] for row in table.rows] == ["26.00", "not walked"]
+    panel = page.sections[1].charts[0].columns[0].panels[0]
+    assert [len(series.x) for series in panel.series] == [2, 2, 2, 1]
+    runs[1].summary["gaits"][1] |= {"measured": 27.0, "stand_in": "baseline"}
+    assert "(baseline: the base model has none) walks 27.00 mm/s, in b" in compare_page(runs).lead
 
 
 def test_errors_stand_in_units_of_each_campaigns_own_floor(tmp_path):

@@ -241,7 +241,8 @@ def test_settings_that_differ_are_refused_with_what_would_be_lost_and_what_would
         run_stages(tmp_path, [replace(begun, settings={"quick": True})])
     assert str(refused.value) == (
         f"{tmp_path / '.measure-unfinished'} holds 2 trials of the stage measure, begun with quick = False, not True: "
-        "resume with the original settings, or choose another folder for a new campaign (both are then kept)"
+        "resume with the original settings and version, move it away to begin this stage again, or choose another "
+        "folder for a new campaign (both are then kept)"
     )
     assert all((tmp_path / ".measure-unfinished" / name).exists() for name in files)
 
