@@ -8,7 +8,16 @@ import numpy as np
 from bifa.errors import BifaError
 from bifa.gait.families import FAMILIES, PERIODS
 from bifa.gait.methods import METHODS, Evaluated
-from bifa.gait.methods.cma_es import BASIN_SPACING, PATIENCE, POPULATION, Patience, basins, climb_basins, climb_together
+from bifa.gait.methods.cma_es import (
+    BASIN_SPACING,
+    NEAR_TOP,
+    PATIENCE,
+    POPULATION,
+    Patience,
+    basins,
+    climb_basins,
+    climb_together,
+)
 from bifa.gait.methods.common import Ends, Objective, OnEvaluated, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, as_walked, distribution, mean_of_walking, on_model
@@ -87,6 +96,7 @@ _RIDGE_SPACING = 0.04  # between the starts of the second round: several along o
 # Climbs on robots: how many families to start from, and the shares of the best value that these, and the end points of
 # the previous round, must reach.
 _FAMILIES, _MIN_FAMILY_RATIO, _MIN_END_RATIO = 3, 0.9, 0.95
+_FAMILY_CLIMBS = 1000  # evaluations of these on the model itself
 # Shares of the best value that a gait must keep in the check: to be accepted at once, and to count as walking.
 _ACCEPT_RATIO, _WALK_RATIO = 0.993, 0.5
 _NO_FINALIST = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
@@ -270,6 +280,9 @@ def optimize(
         refined = _refine_on_robots(search, explored) if settings.refine else []
         gait, nominal = best_of_finalists(search, explored, [explored, *refined][-1])
     else:
+        if settings.refine:
+            explored = _climb_families(search, own, explored)
+            tried = len(explored.values)
         refined = [_refine(search, own, explored)] if settings.refine else []
         gait, nominal = _fastest_finalist(search, explored.joined(*refined))
     verifying, finest = search.verifying_robots(), replace(metric, tolerance_m=FINE_M)
@@ -321,9 +334,28 @@ def explore_on_robots(search: SearchRun, explored: Evaluated) -> Evaluated:
     recorder(copies)
     if not settings.refine:
         return recorder.found()
-    families = _tune_times(recorder, space, space.nearest(FAMILIES), PERIODS)
-    known = list(families.near_best(_MIN_FAMILY_RATIO).finalists(_FAMILIES, _MIN_SPACING, wraps))
+    known = list(_best_families(recorder, space))
     return climb_basins(recorder, wraps, budget, settings.seed, EXPLORE.step, known, EXPLORE.patience)
+
+
+def _climb_families(search: SearchRun, objective: Objective, explored: Evaluated) -> Evaluated:
+    """Climb from the best families, too: two batches of climbs may agree on a slower one."""
+    settings, wraps = search.settings, search.settings.space.wraps
+    climbs = _scaled_budget(_FAMILY_CLIMBS, settings)
+    budget = _tunings(len(FAMILIES), PERIODS) + climbs
+    progress_callback = search.progress_callback("families", budget, explored.best_value)
+    recorder = RecordedObjective(objective, wraps, progress_callback)
+    known = _best_families(recorder, settings.space)
+    if not len(known):
+        return explored.joined(recorder.found())
+    ends = climb_together(recorder, known, climbs, settings.seed, [NEAR_TOP] * len(known))
+    return explored.joined(recorder.found(ends))
+
+
+def _best_families(recorder: RecordedObjective, space: SearchSpace) -> np.ndarray:
+    """The best families (n, dimensions), each with the period and the times that suit the robot; none if none walks."""
+    tuned = _tune_times(recorder, space, space.nearest(FAMILIES), PERIODS)
+    return tuned.near_best(_MIN_FAMILY_RATIO).finalists(_FAMILIES, _MIN_SPACING, space.wraps)
 
 
 def _tune_times(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:

@@ -145,6 +145,12 @@ def test_a_gait_that_walks_by_a_hair_of_its_period_does_not_count_where_periods_
     assert jittered(well)[0] == pytest.approx(exact(well)[0], rel=2e-3)
 
 
+def test_a_nominal_search_whose_climbs_agree_on_a_slow_family_tries_the_others(runs, monkeypatch):
+    """With backlash, two batches of climbs agreed on a family that is 1.7 % slower than another."""
+    monkeypatch.setitem(METHODS, "cma", lambda *_: Evaluated(SPACE.nearest([BASELINE]), np.array([10.8])))
+    assert optimize(nominal(), runs, Settings(robust=False)).nominal_mm_s > 23.0
+
+
 def test_a_robot_that_cannot_walk_is_said_so(runs):
     slippery = nominal().with_values({"mu_s": 0.02, "mu_k": 0.02})
     up = Settings(robust=False, evaluations=60, metric=Metric(inclination_deg=90.0))

@@ -18,7 +18,7 @@ BASIN_SPACING = 0.12  # distance on some axis of the unit cube that puts two sta
 _NEIGHBORS, _COMPARED = 8, 2000
 POPULATION = 12  # points per run and generation, if not told otherwise
 _CLIMBS = 5  # runs side by side, at first and in each restart
-_STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations in the unit cube: in any basin, and near its top
+_STEP, NEAR_TOP = 0.06, 0.02  # initial standard deviations in the unit cube: in any basin, and near its top
 _REL_TOL = 2.5e-3  # relative difference within which the best two runs agree
 _MIN_GAIN = 5e-4  # fraction: a run that gains less in some generations has stalled
 
@@ -81,7 +81,7 @@ def climb_basins(
         starts = np.array([*known, *others])
         if not len(starts):
             break
-        steps = [_NEAR_TOP] * len(known) + [step] * len(others)
+        steps = [NEAR_TOP] * len(known) + [step] * len(others)
         budget, run_seed = evaluations - recorder.count, seed + len(tried)
         more = climb_together(recorder, starts, budget, run_seed, steps, patience, same)
         compared = np.append(compared, more.values[: 1 if by_batch else None])

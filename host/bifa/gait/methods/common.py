@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -70,10 +71,11 @@ class Evaluated:
         return float(self.values.max())
 
     def joined(self, *others: "Evaluated") -> "Evaluated":
-        """Return all evaluations together; they must be of the same objective."""
+        """Return all evaluations and end points together; they must be of the same objective."""
         parts = (self, *others)
         points, values = (np.concatenate([getattr(part, name) for part in parts]) for name in ("points", "values"))
-        return Evaluated(points, values, self.ends)
+        ends = [part.ends for part in parts if part.ends is not None]
+        return Evaluated(points, values, reduce(Ends.joined, ends) if ends else None)
 
     def near_best(self, share: float) -> "Evaluated":
         """Return the evaluations that reach `share` of the best value; none if that is 0."""
