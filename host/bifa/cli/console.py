@@ -33,6 +33,7 @@ def console(port: Annotated[str | None, PORT] = None) -> None:
         raise BifaError("stdin is closed; run it in a terminal, or pipe lines into it")
 
     from bifa.link import Uno
+    from bifa.link.leaving import OFF, valves
     from bifa.link.terminal import settle
     from bifa.rig import open_rig
 
@@ -48,8 +49,8 @@ def console(port: Annotated[str | None, PORT] = None) -> None:
                 converse(uno, rig)
             elif not _pipe(uno, rig):
                 raise typer.Exit(1)
-        if typed:  # confirmed, or leaving would have raised
-            typer.echo("the Uno confirms that all valves are off")
+        if typed:
+            typer.echo("the Uno confirms that all valves are off" if valves() == OFF else valves())
 
 
 def piped_lines(uno: "Uno") -> Iterator[str]:

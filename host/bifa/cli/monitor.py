@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import PORT, file_option, requires
-from bifa.screen import Console
+from bifa.screen import Console, warning
 
 _WEB_PORT = 8765
 
@@ -52,6 +52,7 @@ def monitor(
     from bifa.link import Uno
     from bifa.link.leaving import valves_at
     from bifa.live.monitor import watch
+    from bifa.live.walk import UNSUPPLIED
     from bifa.rig import SameBoard, open_rig
     from bifa.robot import load_model, nominal
     from bifa.robot.gait import read_gait_file
@@ -64,6 +65,8 @@ def monitor(
         if parameters:
             uno.upload(parameters)
         if run and not is_back:
+            if uno.get("pressure_psi") == 0.0:
+                console.print(warning(UNSUPPLIED))
             uno.run()
 
     try:

@@ -41,13 +41,13 @@ def upload(
     check_port(port)
 
     from bifa.link import Uno
-    from bifa.link.leaving import valves_at
+    from bifa.link.leaving import raise_if_unconfirmed, valves
     from bifa.live.walk import UNSUPPLIED, walk
     from bifa.rig import open_rig
     from bifa.robot.gait import read_gait_file
 
     parameters = read_gait_file(gait).parameters
-    console, valves = Console(), "valves off"
+    console = Console()
     with open_rig(port) as rig:
         try:
             with console.status("waiting for the Uno") as shown, Uno(rig.transport, rig.clock) as uno:
@@ -63,6 +63,6 @@ def upload(
         except KeyboardInterrupt as interrupt:
             if not run:
                 raise
-            valves = valves_at(interrupt)
+            raise_if_unconfirmed(interrupt)
         if run:
-            console.print(valves)
+            console.print(valves())

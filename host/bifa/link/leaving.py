@@ -47,7 +47,10 @@ _retry_timers: list[threading.Timer] = []
 _parents: list[int] = []  # the parent's process id, while its death ends this program
 _uninterruptible: set[CodeType] = set()  # code of the functions that must not be interrupted
 AGAIN_AFTER_S = 0.01
+OFF, UNCONNECTED = "valves off", "no robot was connected"
 UNANSWERED = "a stop was sent, but no Uno had answered yet"
+UNCONFIRMED = "a stop was sent, but the Uno did not confirm it"
+_valves = [UNCONNECTED]
 _SET_DEATH_SIGNAL, _GET_DEATH_SIGNAL = 1, 2  # PR_SET_PDEATHSIG, PR_GET_PDEATHSIG of prctl(2)
 _DEATH: Any = getattr(signal, "SIGUSR2", None)  # a separate signal: it also comes if only a thread of the parent ends
 
@@ -68,6 +71,7 @@ def enter(robot: Mover) -> None:
         _earlier_hook.append(sys.unraisablehook)
         sys.unraisablehook = _retry_interrupt
     _active_robots.append(robot)
+    note_valves(UNCONFIRMED)
     if is_first:
         _watch_parent()
 
@@ -198,11 +202,21 @@ def raise_if_unconfirmed(last: BaseException) -> None:
         replaced = replaced.__context__
 
 
+def note_valves(known: str) -> None:
+    """Note what is known of the valves as a robot is left; nothing but a confirmed stop is `OFF`."""
+    _valves[0] = known
+
+
+def valves() -> str:
+    """Return what is known of the valves, in words."""
+    return _valves[0]
+
+
 def valves_at(interrupt: KeyboardInterrupt) -> str:
-    """Return what is known of the valves, in words, when a command ends on `interrupt`: off, unless the Uno that it
-    interrupted noted otherwise. Raises the StillMovingError that `interrupt` replaced (raise_if_unconfirmed)."""
+    """Return what is known of the valves, in words, when a command ends on `interrupt`. Raises the StillMovingError
+    that `interrupt` replaced (raise_if_unconfirmed)."""
     raise_if_unconfirmed(interrupt)
-    return UNANSWERED if UNANSWERED in getattr(interrupt, "__notes__", ()) else "valves off"
+    return valves()
 
 
 def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> Report:

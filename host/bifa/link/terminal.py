@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from bifa.link.errors import NoAnswerError
+from bifa.link.errors import NoAnswerError, RestartedError
 from bifa.link.transport import Clock
 from bifa.link.uno import Uno
 
@@ -21,11 +21,17 @@ def is_answer(line: str) -> bool:
 def reports_stop(lines: Iterable[str], typed: str = "", before: str = "") -> bool:
     """Whether `lines` of the Uno, answers to `typed` included, report a stop or a fault that neither this line nor the
     one `before` explains. Lines that wait were then meant for a robot that had not stopped; a `clear` and a `run` among
-    them would make it walk again."""
+    them would make it walk again. A typed `stop` latches nothing, so only `!` explains a stop."""
     faults = sum(line.startswith("[fault") for line in lines)
     stopped = any(line.startswith("[stopped") for line in lines)
-    asked = any(line.strip() == "stop" or "!" in line for line in (typed, before))
+    asked = "!" in typed or "!" in before
     return faults > (typed.strip() == "status") or (stopped and not asked)  # `status` shows a fault that is latched
+
+
+def raise_if_greeted(lines: Iterable[str]) -> None:
+    """Raise RestartedError if the Uno greets in `lines` unasked: text needs no session, so no frame may tell of it."""
+    if any(line.startswith("[bifa ") and "started by" in line for line in lines):
+        raise RestartedError("the Uno restarted; connect again and repeat")
 
 
 def settle(uno: Uno, clock: Clock) -> None:
@@ -67,6 +73,8 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
         else:
             uno.session.poll(0.02)
             uno.session.raise_if_restarted()
+    if word != "version":
+        raise_if_greeted(lines)
     if word in PARAMETER_COMMANDS:
         uno.parameters()  # reads `host_timeout_s`, and with it how often to keep the link alive
     return lines

@@ -141,11 +141,11 @@ class Uno:
         """Stop the robot; raises StillMovingError from `error` if it may be moving and does not confirm the stop."""
         try:
             if self.session.hello is None:  # never connected: nothing was moved, and nothing will answer
+                leaving.note_valves(leaving.UNANSWERED)
                 self.send_stop()
-                if error is not None:
-                    error.add_note(leaving.UNANSWERED)
             else:
                 leaving.stop_in_new_session(self.session)
+                leaving.note_valves(leaving.OFF)
                 self.may_move = False
         except (ConnectionError, LinkError) as reason:
             if self.may_move:

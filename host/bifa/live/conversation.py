@@ -7,7 +7,7 @@ import threading
 from bifa.link import NoAnswerError, RestartedError, Uno
 from bifa.link.errors import AbandonedError
 from bifa.link.leaving import uninterrupted
-from bifa.link.terminal import reports_stop, settle, type_line
+from bifa.link.terminal import raise_if_greeted, reports_stop, settle, type_line
 from bifa.live.completion import Known
 from bifa.live.rounds import Latest, Pace
 from bifa.rig import Rig
@@ -71,6 +71,7 @@ class Conversation:
     def _run(self) -> None:
         pace = Pace(self._clock)
         try:
+            self._print_lines()  # the greeting
             self._start_telemetry()
             while self._round():
                 pace.wait()
@@ -93,18 +94,27 @@ class Conversation:
             if line:
                 self._carry_out(line)
             self.latest.take(self.uno.samples(WAIT_S))
-            if lines := list(self.uno.session.lines):
-                self.uno.session.lines.clear()
-                print("\n".join(lines))
-                if reports_stop(lines, before=self._last_line):
-                    self._drop_waiting()
+            lines = self._print_lines()
+            raise_if_greeted(lines)
+            if reports_stop(lines, before=self._last_line):
+                self._drop_waiting()
         except RestartedError:
             self._drop_waiting()
             self.uno.connect()
+            self.uno.halt()  # a line that was under way may have started it again
             settle(self.uno, self._clock)
+            self._print_lines()
             self._start_telemetry()
             print("-- the Uno restarted, all valves off; connected again, with its start preset")
         return line is not None
+
+    def _print_lines(self) -> list[str]:
+        """Print the lines that the Uno sent unasked, and return them."""
+        lines = list(self.uno.session.lines)
+        self.uno.session.lines.clear()
+        if lines:
+            print("\n".join(lines))
+        return lines
 
     def _carry_out(self, line: str) -> None:
         before, self._last_line = self._last_line, line

@@ -17,7 +17,7 @@ from rich.status import Status
 from bifa.errors import BifaError
 from bifa.files import is_stray
 from bifa.link import RefusedError, Sample, Uno
-from bifa.link.leaving import raise_if_unconfirmed
+from bifa.link.leaving import valves_at
 from bifa.link.table import MARK_PAUSE
 from bifa.live.rounds import Absence
 from bifa.live.walk import UNSUPPLIED, raise_if_no_reader, stopped_text
@@ -105,8 +105,10 @@ def record_telemetry(
                 with log.absence.waited_out():
                     log.record_until_gone()
     except KeyboardInterrupt as interrupt:
-        raise_if_unconfirmed(interrupt)
-        console.print("ended")
+        console.print(f"ended; {valves_at(interrupt)}")
+    if not log.has_recorded:
+        console.print("nothing was recorded")
+        return
     console.print(f"{out} holds the telemetry; a data set also needs the displacement from your own instrument")
 
 
@@ -120,6 +122,7 @@ class _TelemetryLog:
         self._console, self._desk = console, Desk(console.print)
         self._nonce: int | None = None  # boot number of the last start that was seen; None before the first
         self._is_told = False
+        self.has_recorded = False
         self.absence = Absence(lambda: self._nonce is not None, self._tell)
 
     def _tell(self, error: Exception) -> None:
@@ -145,6 +148,7 @@ class _TelemetryLog:
                     uno.stream(True)
                     marked = uno.mark_strobe()
                     with telemetry_file(self._path) as file:
+                        self.has_recorded = True
                         writer = csv.writer(file)
                         writer.writerow(HEADER)
                         if self._parameters:

@@ -70,6 +70,8 @@ def run_session(
             refuse_other_settings(writer, provenance)
             if writer.trials:
                 rig.resume(len(writer.trials))
+            if uno.may_move:  # not every port restarts the Uno, and somebody may be asked to reach into the stand
+                uno.halt()
             uno.clear()
             supplied = _at_own_pressure(trials, uno.get("pressure_psi"))
             for number, planned in enumerate(supplied, start=1):

@@ -1,12 +1,14 @@
 """Build the image and write it to the board through PlatformIO, or write the package's image with avrdude alone, which
 needs no checkout, PlatformIO or compiler. Failures of these tools are explained in one sentence."""
 
+import os
 import re
 import shutil
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from bifa.computer import PORT_BUSY, PORT_REFUSED
@@ -48,7 +50,8 @@ def build_image(project: Path, on_line: Callable[[str], None]) -> Path:
 def upload_image(project: Path, port: str, on_line: Callable[[str], None]) -> None:
     """Build if needed and write the image to the Uno at `port`; the upload itself resets the board."""
     arguments = ["run", "--environment", ENVIRONMENT, "--target", "upload", "--upload-port", port]
-    _run("PlatformIO", [platformio_program(), *arguments], project, port, on_line)
+    with _held(port):
+        _run("PlatformIO", [platformio_program(), *arguments], project, port, on_line)
 
 
 def avrdude_program() -> Path:
@@ -63,7 +66,34 @@ def write_with_avrdude(image: Path, port: str, on_line: Callable[[str], None]) -
     """Write `image` to the Uno at `port` and verify it; avrdude resets the board."""
     chip = ["-p", "atmega328p", "-c", "arduino", "-P", port, "-b", BAUD, "-D"]
     # By its bare name: in `flash:w:FILE:i` colons separate the fields, and Windows paths contain one.
-    _run("avrdude", [avrdude_program(), *chip, "-U", f"flash:w:{image.name}:i"], image.parent, port, on_line)
+    write = ["-U", f"flash:w:{image.name}:i"]
+    with _held(port):
+        _run("avrdude", [avrdude_program(), *chip, *write], image.parent, port, on_line)
+
+
+@contextmanager
+def _held(port: str) -> Iterator[None]:
+    """Keep programs that ask for a lock, as all of bifa's do, from opening the port: what they send would end up in the
+    image. The uploaders do not ask. On Windows only one program can open a port anyway."""
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    try:
+        handle = os.open(port, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError:  # the uploader says why it does not open
+        yield
+        return
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        raise ToolchainError(PORT_BUSY.format(port=port)) from None
+    try:
+        yield
+    finally:
+        os.close(handle)
 
 
 def _run(name: str, command: Sequence[str | Path], folder: Path, port: str, on_line: Callable[[str], None]) -> None:

@@ -214,6 +214,43 @@ def test_a_stop_that_nobody_confirms_is_said_aloud(board):
         walk_until(board, lambda uno: drop(board, lambda data: True))
 
 
+def silence(board: Board) -> None:
+    drop(board, lambda data: True)
+
+
+def connect(uno: Uno, board: Board) -> None:
+    uno.connect()
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "known"),
+    [
+        (connect, lambda board: None, leaving.OFF),
+        (connect, silence, leaving.UNCONFIRMED),
+        (connect, unplug, leaving.UNCONFIRMED),
+        (lambda uno, board: None, silence, leaving.UNANSWERED),
+    ],
+    ids=["confirmed", "silent", "unplugged", "never answered"],
+)
+def test_valves_are_called_off_only_where_the_uno_has_confirmed_it(board, first, then, known):
+    """Nothing was moved, so that an unconfirmed stop raises no alarm; it is not called confirmed for that."""
+    interrupt = KeyboardInterrupt()
+
+    def talk():
+        with Uno(board, board) as uno:
+            first(uno, board)
+            assert leaving.valves() != leaving.OFF, "of an earlier robot"
+            then(board)
+            raise interrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        talk()
+    assert leaving.valves_at(interrupt) == known
+    again = KeyboardInterrupt()
+    again.__context__ = interrupt
+    assert leaving.valves_at(again) == known, "a second Ctrl-C, while the port closes, says the same"
+
+
 def test_ctrl_c_while_a_stop_is_not_confirmed_is_not_lost_either(board):
     def press(data: bytes) -> bool:
         if data == STOP:

@@ -193,9 +193,9 @@ def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(uno):
         (["ok"], "run", "", False),
         (["[stopped: all valves off until clear", "ok"], "save one", "run", True),
         (["[stopped: all valves off until clear"], "", "run", True),
-        (["[stopped: all valves off until clear"], "", "stop", False),
-        (["ok", "[stopped: all valves off until clear"], "stop", "run", False),
-        (["[stopped: all valves off until clear", "ok"], "clear", " stop", False),
+        (["[stopped: all valves off until clear"], "", "stop", True),
+        (["ok", "[stopped: all valves off until clear"], "stop", "run", True),
+        (["[stopped: all valves off until clear", "ok"], "save one", " stop", True),
         (["[stopped: all valves off until clear", "ok"], "show! period_s", "", False),
         (["[fault sensor_range body value 1 limit 2 at_ms 3"], "", "stop", True),
         (["[state fault", "[fault sensor_range body value 1 limit 2 at_ms 3", "ok"], "status", "clear", False),
@@ -207,18 +207,38 @@ def test_only_a_stop_that_was_typed_is_no_surprise(lines, typed, before, stops):
     assert reports_stop(lines, typed, before) is stops
 
 
-def test_a_pipe_is_not_carried_out_after_a_stop_that_it_did_not_ask_for(uno):
-    uno.on_heard = lambda data: uno.board.write(frames.STOP) if b"save one" in data else None
-    done = CliRunner().invoke(app, ["console", "--port", uno.device], input="save one\nclear\nrun\nshow period_s\n")
+@pytest.mark.parametrize("first", ["show period_s", "run\nstop"])
+def test_a_pipe_is_not_carried_out_after_a_stop_that_it_did_not_ask_for(uno, first):
+    stopped_s = []
+
+    def stop(data):
+        if b"save one" in data:
+            uno.board.write(frames.STOP)
+            stopped_s.append(uno.board.now())
+
+    uno.on_heard = stop
+    lines = f"{first}\nsave one\nclear\nrun\nshow period_s\n"
+    done = CliRunner().invoke(app, ["console", "--port", uno.device], input=lines)
     assert done.exit_code == 1
-    assert done.output.splitlines() == [
+    assert done.output.splitlines()[-3:] == [
         "[stopped: all valves off until clear", "ok",
         "error: the robot has stopped by itself; the remaining lines are not carried out"]  # fmt: skip
-    assert uno.driven_s == 0.0
+    assert uno.driven_s <= stopped_s[0]
     uno.on_heard = lambda data: None
     done = CliRunner().invoke(app, ["console", "--port", uno.device], input="clear\nrun\nstop\nclear\nshow period_s\n")
     assert done.exit_code == 0, done.output
     assert "period_s 5.7" in done.output
+
+
+def test_a_pipe_is_not_carried_out_after_a_restart(uno):
+    """Text needs no session: the new start would answer each line, and walk with its start preset."""
+    uno.on_heard = lambda data: uno.board.reset() if b"show period_s" in data else None
+    done = CliRunner().invoke(app, ["console", "--port", uno.device], input="set period_s 2\nshow period_s\nrun\n")
+    assert isinstance(done.exception, RestartedError)
+    assert uno.driven_s == 0.0
+    uno.on_heard = lambda data: None
+    done = CliRunner().invoke(app, ["console", "--port", uno.device], input="version\nshow period_s\n")
+    assert done.exit_code == 0, done.output
 
 
 @pytest.mark.parametrize("ask", [Uno.status, Uno.parameters, Uno.presets, Uno.exchange_clocks])

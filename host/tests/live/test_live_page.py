@@ -63,6 +63,11 @@ def test_a_slider_predicts_apply_changes_the_robot_and_stop_says_when_it_has(wal
     expect(predicted).not_to_contain_text("10.8")
     expect(predicted).to_have_text(re.compile(r"predicts \d+\.\d\d mm/s.*; \d+\.\d\d mm of slip"), timeout=PATIENCE_MS)
     assert walking.gait()["period_s"] == pytest.approx(5.7), "the robot changes only on Apply"
+    box = page.locator(":has(> input[name=duty_body]) > input[type=number]")
+    duty = box.input_value()
+    box.fill("")
+    expect(page.get_by_role("button", name="Apply")).to_be_disabled()  # an empty box would be 0
+    box.fill(duty)
     page.get_by_role("button", name="Apply").click()
     page.get_by_text("applied;").wait_for()
     assert walking.gait()["period_s"] == pytest.approx(4.5)

@@ -228,6 +228,26 @@ def test_why_a_robot_stopped_that_nobody_here_stopped_is_told():
     assert "at the Uno" in reports[-1]["stopped"]["why"]
 
 
+def test_a_later_stop_is_not_laid_to_somebody_who_stopped_the_robot_before():
+    """Somebody here stops and releases it; while it rests, the emergency stop is pressed."""
+    board, done = Board(), []
+
+    def during(pilot, report):
+        state = report.get("robot")
+        if state == "running" and not done:
+            done.append(pilot.stop())
+        elif state == "stopped" and len(done) == 1:
+            done.append(pilot.ask(Uno.clear))
+        elif state == "idle" and len(done) == 2:
+            done.append(report["stopped"])
+            board.write(b"!")
+
+    _, reports, _ = flown(during, 3.0, Uno.run, uno_of(board))
+    assert done[2] is None, "nothing is latched any more"
+    assert reports[-1]["robot"] == "stopped"
+    assert (reports[-1]["stopped"]["by"], "at the Uno" in reports[-1]["stopped"]["why"]) == ("", True)
+
+
 def test_which_fault_there_is_is_told_also_after_somebody_has_stopped_the_robot():
     board, asked = Board(), []
 

@@ -19,6 +19,7 @@ from bifa.problem.switches import seconds_per_uno_s, valves_of, walk_timeline
 from bifa.problem.system import spare
 from bifa.rig import open_rig
 from bifa.robot.gait import Gait
+from harness.board import Board
 from harness.lab import PLAN, PULL, STATIC, WALK
 from virtual_robot.uno import CLOCK_HZ
 
@@ -51,6 +52,23 @@ def set_pressure(rig, psi):
     with Uno(rig.transport, rig.clock) as uno:
         uno.connect()
         uno.set("pressure_psi", psi)
+
+
+def test_who_is_asked_to_reach_into_the_stand_finds_all_valves_off(tmp_path):
+    """Not every port restarts the Uno: it may be walking when a session begins."""
+    board, asked = Board(), []
+    board.write(b"run\n")
+    board.sleep(1.0)
+    assert board.valves
+    rig = SimpleNamespace(transport=board, clock=board, next_session_seed=lambda: 1)
+
+    def record(*_):
+        asked.append(board.valves)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(rig, tmp_path / "day", [PULL], record=record)
+    assert asked == [0]
 
 
 @pytest.mark.uno

@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 import termios
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -20,7 +21,10 @@ from bifa.firmware import ImageError, carried_image, image_of, write_image
 from bifa.link import PortGoneError
 from bifa.link.table import TABLE_HASH
 from bifa.rig import ports
+from bifa.rig.serial_transport import SerialTransport
 from bifa.toolchain import ToolchainError, flash, project
+from harness.waiting import PATIENCE_S
+from harness.waiting import until as wait_until
 from virtual_robot.rig import open_rig
 
 
@@ -164,6 +168,22 @@ def test_a_port_that_was_opened_while_the_image_was_built_is_not_written_to(monk
     monkeypatch.setattr("bifa.toolchain.choose_port", opened)
     assert "in use" in str(CliRunner().invoke(app, ["flash"]).exception)
     assert not writes.called
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there only one program can open a port anyway")
+def test_nobody_else_opens_the_port_while_the_image_is_written(program, only_path, package, uno):
+    """A page that waits for the Uno would send its stop into the image."""
+    begun, go_on = only_path / "begun", only_path / "go_on"
+    program(only_path / "avrdude", f"echo > {begun}\nuntil [ -e {go_on} ]; do /bin/sleep 0.01; done")
+    image = carried_image(package)
+    with ThreadPoolExecutor(1) as thread:
+        writing = thread.submit(flash.write_with_avrdude, image, uno.device, lambda line: None)
+        wait_until(begun.exists)
+        with pytest.raises(PortGoneError, match="in use"):
+            SerialTransport(uno.device)
+        go_on.touch()
+        writing.result(PATIENCE_S)
+    SerialTransport(uno.device).close()
 
 
 def test_a_failing_avrdude_ends_in_a_sentence(program, no_checkout, writes):

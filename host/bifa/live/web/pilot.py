@@ -19,7 +19,7 @@ from bifa.rig import SameBoard
 
 REPORT_S = 0.1
 MAX_REQUESTS = 16
-MOVING = ("running", "holding")
+MOVING, LATCHED = ("running", "holding"), ("stopped", "fault")
 _LOOK_S = 0.02  # longest time that a request waits for the robot's samples
 _EVERY_NTH = 5  # every fifth sample is shown: 20 a second
 _BETWEEN_STOPS_S = 0.02  # so that repeated stops leave room on the line for the answer
@@ -215,7 +215,7 @@ class Pilot:
                 self.stopped = {**(self.stopped or {}), "is_confirmed": confirmed, "at": wall_clock()}
 
     def note_stopped(self, stopped: dict[str, Any] | None) -> None:
-        """Record that the robot stopped without a request from here, or (None) that it moves again."""
+        """Record that the robot stopped without a request from here, or (None) that nothing is latched."""
         with self._lock:
             if self._stop is None:
                 self.stopped = stopped
@@ -285,9 +285,9 @@ class _Flight:
         """Find out why the robot stopped, if it did so by itself, and whether pending parameters have been adopted."""
         state = self._latest.sample.state if self._latest.sample else ""
         if state != self._state:
-            if self._state in MOVING and state not in MOVING and self._pilot.stopped is None:
+            if state in LATCHED and self._pilot.stopped is None:
                 self._pilot.note_stopped(_stop_record(why=self._uno.status().why_stopped))
-            elif state in MOVING:
+            elif state in MOVING or (self._state in LATCHED and state not in LATCHED):
                 self._pilot.note_stopped(None)
             self._state = state
         if self._settings["is_pending"]:

@@ -51,6 +51,7 @@
 
   const box = (slider) => slider.parentElement.querySelector("[type=number]");
   const gait = () => Object.fromEntries(sliders.map((slider) => [slider.name, Number(box(slider).value)]));
+  const isFilled = () => sliders.every((slider) => box(slider).value !== ""); // empty, or no number yet, would be 0
   const set = (wanted) => sliders.forEach((slider) => { slider.value = box(slider).value = wanted[slider.name]; });
   const rounded = (value) => Math.round(1e4 * value) / 1e4;
 
@@ -77,8 +78,12 @@
     if (live.draft && live.draft.by !== you.number) set(live.draft.gait);
   };
   for (const slider of sliders) {
-    slider.addEventListener("input", () => { box(slider).value = slider.value; draft(); });
-    box(slider).addEventListener("input", () => { slider.value = box(slider).value; draft(); });
+    slider.addEventListener("input", () => { box(slider).value = slider.value; if (isFilled()) draft(); });
+    box(slider).addEventListener("input", () => {
+      if (box(slider).value === "") return;
+      slider.value = box(slider).value;
+      if (isFilled()) draft();
+    });
   }
   revert.addEventListener("click", () => {
     set(Object.fromEntries(sliders.map(({ name }) => [name, rounded(live.parameters[name])])));
@@ -130,7 +135,7 @@
 
   const showControls = (differs) => {
     const may = you.is_owner && !live.gone && Boolean(live.parameters);
-    const can = { run: ["idle", "holding"].includes(live.robot), clear: ["stopped", "fault"].includes(live.robot), apply: differs, save: true, load: presets.options.length > 0 };
+    const can = { run: ["idle", "holding"].includes(live.robot), clear: ["stopped", "fault"].includes(live.robot), apply: differs && isFilled(), save: isFilled(), load: presets.options.length > 0 };
     for (const button of document.querySelectorAll("[data-do]")) button.disabled = !may || !can[button.dataset.do];
     for (const control of [...sliders, ...sliders.map(box), closing, preset, presets]) control.disabled = !may;
     revert.disabled = !may || !differs;
