@@ -132,15 +132,39 @@ def read_columns(
     a last row of an export with a time alone is left out. Raises DatasetError naming file, line, column and cell."""
     rows = _rows(sheet, export)
     there = [name for name in optional if name in export.columns or name in sheet.labels()]
+    places = _places(sheet, export, (*wanted, *there))
     columns = {name: _column(sheet, export, name, rows) for name in (*wanted, *there)}
-    read = [values for name, values in columns.items() if export.columns.get(name) != ROW_NUMBER]
-    filled = np.flatnonzero(np.any([~np.isnan(values) for values in read], axis=0))
-    count = filled[-1] + 1 if len(filled) else 0
+    count = len(rows)
+    while count and sheet.is_blank(rows[count - 1], places):
+        count -= 1
     if export is not OWN_NAMES:
+        sheet.refuse_data_as_names(export.columns.get(name, name) for name in columns)
         sheet.refuse_empty_lines(rows[:count])
-        channels = [values for name, values in columns.items() if name != "time_s"]
-        count -= bool(count and channels and np.isnan([values[count - 1] for values in channels]).all())
+        sheet.refuse_short_lines(rows[:count])
+        known = [name for name, values in columns.items() if count and not np.isnan(values[count - 1])]
+        count -= known == ["time_s"] != list(columns)
     return {name: values[:count] for name, values in columns.items()}, rows[:count]
+
+
+def _places(sheet: Sheet, export: Export, names: Iterable[str]) -> set[int]:
+    """Places in the sheet of the columns `names`; refuses one that would count as two of a record."""
+    found: dict[int, list[str]] = {}
+    for name in names:
+        source = export.columns.get(name, name)
+        parts = source.split(" + ") if export.units.get(name) == DATE else [source]
+        for place in (sheet.find(part) for part in parts if part != ROW_NUMBER):
+            for other in found.setdefault(place, []):
+                if _in_one_record(other, name):
+                    called = sheet.labels()[place]
+                    raise sheet.error(
+                        f"{other} and {name} are both declared as this column: only one can be", -1, called
+                    )
+            found[place].append(name)
+    return set(found)
+
+
+def _in_one_record(*names: str) -> bool:
+    return any(set(names) <= set(layout.all_columns) for layout in EXPERIMENTS.values())
 
 
 def refuse_falling(

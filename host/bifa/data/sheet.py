@@ -30,6 +30,10 @@ _HEAD = 1 << 18  # bytes in which a header has to be found
 _MAX_LISTED = 8
 _DATUM = re.compile(r"[-+.,]?\d")  # how numbers, dates and times begin
 _PLACE = re.compile(r"(?:(.+) )?\[([1-9]\d*)\]", re.ASCII)  # "X [2]", the second X; "[2]", the second of all
+_DAY = r"\d{1,4}[-/.](\d{1,2}|[a-z]{3})[-/.]\d{1,4}"
+_CLOCK = r"(\d+\.)?\d+:\d\d(:\d\d)?([.,:]\d+)?( ?[ap]m)?(Z|[+-]\d\d:?\d\d)?"
+_MOMENT = re.compile(rf"{_DAY}([T ]+{_CLOCK})?|{_CLOCK}", re.ASCII | re.IGNORECASE)
+_DIMENSIONLESS = "1"  # as a unit
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,26 @@ class SheetForm:
 OWN = SheetForm()
 
 
+def split_blanks(line: str) -> list[str]:
+    """Return the cells of a line that blanks separate. Those within numbers, such as a no-break space, do not."""
+    return [cell for cell in re.split(r"[ \t\r]+", line) if cell]
+
+
+def number_in(cell: str, mark: str, between: str | None = None) -> float | None:
+    """Return the number in a cell with the decimal sign `mark` and, if given, the sign `between` groups of three
+    digits; None if it holds anything else."""
+    if between is not None:
+        cell = _grouped(between).sub(lambda digits: digits[0].replace(between, ""), cell, count=1)
+    if mark == ".":
+        return number(cell)
+    return None if "." in cell else number(cell.replace(mark, "."))
+
+
+def is_datum(cell: str, mark: str) -> bool:
+    """Whether a cell holds a number with the decimal sign `mark`, a date or a time."""
+    return number_in(cell, mark) is not None or _MOMENT.fullmatch(cell.strip()) is not None
+
+
 class Sheet:
     """A table as written in the file. `names`: the parts of each column's name, one per header row; `units`: each
     column's cells in the lines of units; `first`: line of the first data row. Raises DatasetError if it is no table."""
@@ -79,7 +103,8 @@ class Sheet:
         self.names = [_parts(header, place) for place in range(width)]
         self.units = [tuple(filter(None, (_cell(row, place) for row in units))) for place in range(width)]
         self._refuse_other_separator()
-        self._refuse_numbers_as_units(units[len(units) - form.units_rows :])
+        self._last_names = header[-1] if header else []
+        self._refuse_data_as_units(heads[len(header) :])
 
     # -- reading ---------------------------------------------------------------------------------------------------
 
@@ -180,7 +205,7 @@ class Sheet:
         if self._form.format == "xlsx":
             return line.split(_BETWEEN_CELLS)
         if self._form.separator == " ":
-            return line.split()
+            return split_blanks(line)
         try:
             return next(csv.reader([line.strip("\r")], delimiter=self._form.separator, skipinitialspace=True), [])
         except csv.Error as error:
@@ -216,9 +241,15 @@ class Sheet:
             before, last = (len(self._written(row)) for row in (len(frame) - 2, len(frame) - 1))
             if last < before:
                 self.refuse_cut()
-        empty = frame.isna().to_numpy().all(axis=1)
-        last = len(frame) - int(np.argmin(empty[::-1])) if len(frame) and not empty.all() else 0
+        last = len(frame)
+        while last and self._is_blank_line(frame, last - 1):
+            last -= 1
         return frame.iloc[:last]
+
+    def _is_blank_line(self, frame: Any, row: int) -> bool:
+        if self._form.format == "xlsx":
+            return bool(frame.iloc[row].isna().all())
+        return not self._bare(self._decoded(self._lines[row]))
 
     def refuse_cut(self) -> None:
         """Refuse a last line without a line break, as of a file that was cut, perhaps within a number."""
@@ -290,13 +321,31 @@ class Sheet:
                         self.first - 1,
                     )
 
-    def _refuse_numbers_as_units(self, rows: Sequence[Sequence[str]]) -> None:
+    def _refuse_data_as_units(self, rows: Sequence[Sequence[str]]) -> None:
         """Refuse a row of units that is a row of data, which would be lost."""
         for at, row in enumerate(rows, self.first - len(rows)):
-            written = [cell.strip(BLANKS) for cell in row if cell.strip(BLANKS)]
-            if written and all(self._read(cell) is not None for cell in written):
-                problem = f"declared as units, but has numbers ({', '.join(written[:3])})"
+            written, data = self._data(row)
+            if data and (len(data) == len(written) or set(data) != {_DIMENSIONLESS}):
+                problem = f"declared as units, but has numbers ({', '.join(data[:3])})"
                 raise self._error(f"{problem}: declare units_rows as one less, or 0 if the file has none", at)
+
+    def refuse_data_as_names(self, columns: Iterable[str]) -> None:
+        """Refuse a last row of names that is a row of data, which would be lost, unless it names one of the declared
+        `columns`: channels may be numbered."""
+        written, data = self._data(self._last_names)
+        used = {self._form.header, *(part for column in columns for part in column.split(" / "))}
+        if data and len(data) == len(written) and used.isdisjoint(data):
+            problem = f"declared as names, but has only numbers ({', '.join(data[:3])})"
+            advice = (
+                "declare header_rows as one less, or 0 if the file has none; if they are names, skip them (skip_rows)"
+            )
+            raise self._error(f"{problem}: {advice}", self.first - self._form.units_rows - 1)
+
+    def _data(self, row: Sequence[str]) -> tuple[list[str], list[str]]:
+        """Cells of a row that are not empty, and those of them that are numbers, dates or times."""
+        written = [cell.strip(BLANKS) for cell in row if cell.strip(BLANKS)]
+        marks = (self._form.decimal, ".")  # of a workbook's numbers as text
+        return written, [c for c in written if self._read(c) is not None or any(is_datum(c, mark) for mark in marks)]
 
     @property
     def _which(self) -> str:
@@ -363,12 +412,17 @@ class Sheet:
         written = map(self._written, range(len(self)))
         return [row[place] if place < len(row) else "" for row in written]
 
+    def is_blank(self, row: int, places: Iterable[int]) -> bool:
+        """Return whether all cells of a row at these places are empty, as text: "nan" is not."""
+        if self._form.format == "xlsx":
+            cells = _marked(self._frame.iloc[row], self._form.decimal)
+        else:
+            cells = self._written(row)
+        return not any(cells[place].strip(BLANKS) for place in places if place < len(cells))
+
     def _read(self, cell: str) -> float | None:
         """The number in a cell as declared, or None."""
-        mark, between = self._form.decimal, self._form.thousands
-        if between is not None and _grouped(between).match(cell):
-            cell = cell.replace(between, "")
-        return number(cell if mark == "." else cell.replace(".", " ").replace(mark, "."))
+        return number_in(cell, self._form.decimal, self._form.thousands)
 
     def _number(self, cell: str, row: int, name: str) -> float:
         cell = cell.strip(BLANKS)
@@ -408,9 +462,26 @@ class Sheet:
 
     def refuse_empty_lines(self, rows: np.ndarray) -> None:
         """Refuse empty lines among `rows`."""
-        if (empty := self._frame.isna().to_numpy().all(axis=1)[rows]).any():
-            row = int(rows[np.argmax(empty)])
-            raise self.error(f"the line is empty{self.another_table(row)}", row)
+        places = range(self._frame.shape[1])
+        for at in np.flatnonzero(self._frame.isna().to_numpy().all(axis=1)[rows]):
+            if self.is_blank(row := int(rows[at]), places):
+                raise self.error(f"the line is empty{self.another_table(row)}", row)
+
+    def refuse_short_lines(self, rows: np.ndarray) -> None:
+        """Refuse a line of fewer cells than the lines before and after it among `rows`: those to the right of a lost
+        cell would count as the columns before."""
+        if self._form.format == "xlsx" or self._form.separator == " " or self._frame.iloc[rows, -1].notna().all():
+            return
+        counts = [self._count(int(row)) for row in rows]
+        for row, before, count, after in zip(rows, [len(self.names), *counts], counts, counts[1:], strict=False):
+            if count < min(before, after):
+                problem = f"{count} fields, but {after} in the next line: which of them is missing is unknown"
+                raise self.error(f"{problem}{self.another_table(int(row))}", int(row))
+
+    def _count(self, row: int) -> int:
+        """Number of cells of a line."""
+        line, mark = self._lines[row], self._form.separator.encode()
+        return len(self._written(row)) if b'"' in line else line.count(mark) + 1
 
     def another_table(self, row: int) -> str:
         """Return what to do about a fault in or below an empty line, or where the names stand again, since another
@@ -437,7 +508,7 @@ class Sheet:
 def _grouped(between: str) -> re.Pattern[str]:
     """Numbers whose integer digits are in groups of three."""
     mark = re.escape(between)
-    return re.compile(rf"[+-]?[1-9]\d{{0,2}}({mark}\d{{3}})+(?!\d|{mark})", re.ASCII)
+    return re.compile(rf"^[+-]?[1-9]\d{{0,2}}({mark}\d{{3}})+(?!\d|{mark})", re.ASCII)
 
 
 def _exact() -> dict[str, str]:
@@ -461,7 +532,7 @@ def _excel(path: Path, sheet: str | int | None, file: str) -> Any:
         with pandas.ExcelFile(path, engine="openpyxl") as book:
             names = book.sheet_names
             if sheet is None or sheet in (*names, *range(len(names))):
-                return pandas.read_excel(book, sheet_name=sheet, header=None)
+                return pandas.read_excel(book, sheet_name=sheet, header=None, keep_default_na=False, na_values=[""])
     except Exception as error:  # openpyxl's own, and zipfile's
         raise DatasetError(f"cannot be read as a workbook (.xlsx): {error}", file=file) from None
     called = f"sheet {sheet + 1}" if isinstance(sheet, int) else f"sheet {sheet!r}"

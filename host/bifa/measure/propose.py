@@ -16,10 +16,9 @@ import tomli_w
 from bifa.data.errors import DatasetError
 from bifa.data.export import ROLES, Export, parse_exports, presets, unit_in, unit_in_file, units_for
 from bifa.data.fields import Fields, Source
-from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, sheets
+from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, is_datum, sheets, split_blanks
 from bifa.files import read_bytes
 from bifa.measure.instruments import CHANNELS
-from lacuna.decimals import number
 
 ROWS_SHOWN = 3
 _MAX_LINES = 400  # lines that are inspected
@@ -31,11 +30,8 @@ _NAME_PATTERNS = {  # names that a column may have, in the languages of the pres
     "displacement": (r"displ|d[ée]pl|exten|stroke|travel|weg|verl|course", r"posi", r"cross|^x$|/ x$| x$"),
     "force": (r"force|load|kraft", r"last|charge"),
 }
-_DAY = r"\d{1,4}[-/.](\d{1,2}|[a-z]{3})[-/.]\d{1,4}"
-_CLOCK = r"(\d+\.)?\d+:\d\d(:\d\d)?([.,:]\d+)?( ?[ap]m)?(Z|[+-]\d\d:?\d\d)?"
 _IN_BRACKETS = re.compile(r"\(.*\)|\[.*\]")
 _OTHER_UNITS = {"v", "mv", "volt", "volts", "%", "mm/mm", "°"}
-_MOMENT = re.compile(rf"{_DAY}([T ]+{_CLOCK})?|{_CLOCK}", re.ASCII | re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -164,7 +160,7 @@ def _is_utf8(raw: bytes) -> bool:
 
 def _split(line: str, mark: str) -> list[str]:
     if mark == " ":
-        return line.split()
+        return split_blanks(line)
     try:
         return next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])
     except csv.Error:
@@ -186,16 +182,8 @@ def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
     """Share of numbers and dates among the non-empty cells; 0 if there are fewer than two."""
     written = [cell for cell in cells if cell.strip()]
-    found = sum(_is_datum(cell, decimal) for cell in written)
+    found = sum(is_datum(cell, decimal) for cell in written)
     return found / len(written) if len(written) > 1 else 0.0
-
-
-def _is_datum(cell: str, decimal: str) -> bool:
-    return _is_number(cell, decimal) or _MOMENT.fullmatch(cell.strip()) is not None
-
-
-def _is_number(cell: str, decimal: str) -> bool:
-    return number(cell if decimal == "." else cell.replace(".", " ").replace(",", ".")) is not None
 
 
 def _heads(
@@ -235,7 +223,7 @@ def _heads(
 
 def _has_same_numbers(row: Sequence[str], other: Sequence[str], decimal: str) -> bool:
     """Whether two rows of equal length both have numbers or dates in at least two of their columns."""
-    both = (all(_is_datum(cell, decimal) for cell in pair) for pair in zip(row, other, strict=False))
+    both = (all(is_datum(cell, decimal) for cell in pair) for pair in zip(row, other, strict=False))
     return len(row) == len(other) and sum(both) > 1
 
 

@@ -93,6 +93,12 @@ MALFORMED_CSV = {
     "column twice": (edit_row(1, 5, "time_s"), 1, "time_s", "twice"),
     "no header": (edit_lines(lambda lines: lines.pop(0)), 1, "0", "unknown column"),
     "empty name": (edit_row(1, 5, ""), 1, "(no name)", "unknown column ''"),
+    "NaN at the end": (
+        edit_lines(lambda lines: lines.insert(-1, "nan" + 7 * ",nan")),
+        42,
+        "time_s",
+        "value is missing",
+    ),
     "NaN": (edit_row(7, 4, "nan"), 7, "displacement_head_mm", "the value is missing"),
     "infinity": (edit_row(7, 4, "-inf"), 7, "displacement_head_mm", "-inf is beyond any measurement"),
     "too large": (edit_row(7, 4, "1e999"), 7, "displacement_head_mm", "beyond any measurement"),

@@ -296,6 +296,46 @@ READ = {
         SIMPLE,
         [[0.0, 1.0], [1.5, -11.5], [-2.5, 12.5]],
     ),
+    "decimal commas without a digit before them": (
+        "t;x;F\n0;,125;-,5\n1;2;3\n",
+        SIMPLE + COMMAS,
+        [[0.0, 1.0], [0.125, 2.0], [-0.5, 3.0]],
+    ),
+    "any number of blanks": (
+        "t x\t F\n 0  1 \t2\n1\t2  3 \n",
+        SIMPLE + SPACES,
+        [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
+    ),
+    "a name that no row has a cell under (LabVIEW's comments)": (
+        "t,x,F,Comment\n0,1,2\n1,2,3\n2,3,4\n",
+        SIMPLE,
+        [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0], [2.0, 3.0, 4.0]],
+    ),
+    "a comment in one row alone": (
+        "t,x,F,Comment\n0,1,2,begin\n1,2,3\n2,3,4\n",
+        SIMPLE,
+        [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0], [2.0, 3.0, 4.0]],
+    ),
+    "short rows of another kind between those that count": (
+        "id,t,x,F,n\n1,0,1,2,9\n2,lost\n1,1,2,3,9\n",
+        SIMPLE + "where = { id = 1 }\n",
+        [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
+    ),
+    "names that are numbers, by which columns are declared": (
+        "1,2,3\n0,1,2\n1,2,3\n",
+        named("1", "2", "3"),
+        [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
+    ),
+    "units of which one is dimensionless": (
+        "t,x,F,strain\ns,mm,N,1\n0,1,2,0\n1,2,3,0\n",
+        SIMPLE + "units_rows = 1\n",
+        [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
+    ),
+    "rows of separators at the end, as spreadsheets write them": (
+        "t,x,F\n0,1,2\n1,2,3\n,,\n,,\n\n",
+        SIMPLE,
+        [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
+    ),
     "a column's name alone is no unit": (
         "t,x,N\n0,1,2\n1,2,3\n",
         SIMPLE.replace('"N"', '"kN"').replace('"F"', '"N"'),
@@ -373,6 +413,61 @@ def test_a_workbook_comes_in(tmp_path):
         ),
         ("t x F\n0 1 2\n1   3\n2 3 4\n", SIMPLE + SPACES, r"line 3: 2 fields, but 3 columns: which of them is missing"),
         (ROWS, SIMPLE + "units_rows = 1\n", r"line 2: declared as units, but has numbers \(0, 1, 2\)"),
+        *(
+            ("t,x,F\n" + f"{row}\n1,2,3\n2,3,4\n", SIMPLE + "units_rows = 1\n", f"line 2: declared as units, .*{data}")
+            for row, data in (
+                ("0,1,---", r"\(0, 1\)"),
+                ("10:00:00.00,0.1,0.2", "10:00:00.00, 0.1"),
+                ("12:00:01 PM,---,---", r"\(12:00:01 PM\)"),
+                ("2026-11-25T10:00:00,---,---", "2026-11-25"),
+            )
+        ),
+        *(
+            (rows, columns, r"line {}: declared as names, but has only numbers \({}.*header_rows".format(*place))
+            for rows, columns, place in (
+                ("0,1,2\n1,2,3\n2,3,4\n", named("[1]", "[2]", "[3]"), (1, "0, 1, 2")),
+                ("0;1,5;2\n1;2,5;3\n", named("[0]", "[2]", "[3]") + COMMAS, (1, "0, 1,5, 2")),
+                (ROWS + "2,3,4\n", SIMPLE + "header_rows = 2\n", (2, "0, 1, 2")),
+                (
+                    "10:00:00,1,2\n10:00:01,1,2\n",
+                    CLOCK.replace('"t"', '"[1]"').replace('"x"', '"[2]"').replace('"F"', '"[3]"'),
+                    (1, "10:00:00"),
+                ),
+            )
+        ),
+        *(
+            (f"t{s}x{s}F{s}n\n0{s}1{s}2{s}9\n1{s}2{s}9\n2{s}3{s}4{s}9\n".replace("\n0", begin), SIMPLE + form, said)
+            for s, form in ((",", ""), (";", 'separator = ";"\n'), ("\t", 'separator = "tab"\n'))
+            for begin, said in (
+                ("\n0", "line 3: 3 fields, but 4 in the next line: which of them is missing is unknown"),
+                (f"\n0{s}9{s}9\n0", "line 2: 3 fields, but 4 in the next line"),
+            )
+        ),
+        *(
+            (
+                f"t x F\n0,00 934,5 2,0\n1,00 1{blank}034,5 3,0\n",
+                SIMPLE + SPACES + 'decimal = ","\n',
+                "line 3, column x: .* is not a number",
+            )
+            for blank in "\u00a0\u2009\u202f\x0b\u3000"
+        ),
+        *(
+            (
+                f"t;x;F\n0;1;2\n1;{cell};3\n",
+                SIMPLE + COMMAS,
+                f"line 3, column x: '{re.escape(cell)}' is not a number; decimal points",
+            )
+            for cell in (".125", "-.5", "+.5", "1.")
+        ),
+        ('t,x,F\n0,1,2\n1,"1,234.567,8",3\n', SIMPLE + 'thousands = ","\n', "'1,234.567,8' is not a number"),
+        *(
+            (
+                "t,x,F\n0,1,2\n1,2,3\n",
+                named(*columns),
+                "line 1, column x: displacement_mm and force_N are both declared as this",
+            )
+            for columns in (("t", "x", "[2]"), ("t", "[2]", "x"), ("t", "x", "x [1]"))
+        ),
         ("t,x,Kraft / kN\n0,1,2\n", named(force="Kraft / kN"), "the file says kN, " + UNITS),
         ('t,x,"load, kN"\n0,1,2\n', named(force="load, kN"), "kN, " + UNITS),
         ("t,x,F\n(s),(mm),(kN)\n0,1,2\n", SIMPLE + "units_rows = 1\n", "line 2, column F: the file says kN, " + UNITS),
@@ -412,6 +507,25 @@ def test_a_workbook_comes_in(tmp_path):
 def test_a_fault_is_named_by_line_column_and_cell(tmp_path, text, declaration, said):
     with pytest.raises(DatasetError, match=rf"a\.csv.*{said}"):
         read(tmp_path, text, declaration)
+
+
+def test_nan_that_is_written_is_no_empty_cell_at_the_end_of_a_file_either(tmp_path):
+    for rows in ("0,1,2\n1,2,3\nnan,nan,nan\n", "0,1,2\nnan,nan,nan\n2,3,4\n"):
+        assert np.isnan(read(tmp_path, "t,x,F\n" + rows)["force_N"]).sum() == 1
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    table = pandas.DataFrame({"t": [0.0, 0.1, "n/a"], "x": [1.0, 2.0, "n/a"], "F": [3.0, 4.0, "n/a"]})
+    table.to_excel(tmp_path / "a.xlsx", index=False)
+    with pytest.raises(DatasetError, match=r"a\.xlsx, line 4, column t: 'n/a' is not a number"):
+        read_export(tmp_path / "a.xlsx", declared(SIMPLE + 'format = "xlsx"\n'), MACHINE)
+
+
+def test_a_cameras_marker_may_be_the_head_of_a_walk_and_the_actuator_of_a_step(tmp_path):
+    """These are columns of different records, though `bifa instrument` reads all of them to check a declaration."""
+    path = write_export(tmp_path, "arduino", {key: RECORD[key] for key in ("time_s", "displacement_mm")})
+    wanted = ("time_s", "displacement_mm", "displacement_head_mm")
+    found, _, _ = read_export(path, by_preset("arduino", "camera"), wanted)
+    np.testing.assert_array_equal(found["displacement_mm"], found["displacement_head_mm"])
 
 
 def test_an_encoding_that_is_another_is_said_with_how_to_declare_it(tmp_path):
