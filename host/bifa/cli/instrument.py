@@ -128,9 +128,14 @@ def _ask_declaration(console: Console, seen: "Look", role: str) -> dict[str, Any
         if column == "-":
             continue
         columns[name] = column
-        told = seen.unit(name, column.split(" + ")[0]) or (given.units.get(name) if given else None)
+        first = column.split(" + ")[0]
+        stated, told = seen.stated(first), seen.unit(name, first)
+        if stated and not told:
+            console.print(f"The file says {stated!r} for {column!r}, which is none of the units.")
+        elif given:
+            told = told or given.units.get(name)
         units[name], scale = _unit(column, units_for(name), told, name == "time_s")
-        changes["factor"] |= {} if scale == 1.0 else {name: scale}
+        changes["factor"] |= {name: scale} if scale is not None else {}
         if name != "time_s" and typer.confirm(f"Reverse the sign of {name}?", default=False):
             changes["sign"][name] = -1
         more |= _clock(units[name], given) if name == "time_s" else {}
@@ -165,7 +170,7 @@ def _is_there(console: Console, seen: "Look", column: str) -> bool:
     return True
 
 
-def _unit(column: str, allowed: list[str], told: str | None, is_time: bool) -> tuple[str, float]:
+def _unit(column: str, allowed: list[str], told: str | None, is_time: bool) -> tuple[str, float | None]:
     """Ask for a column's unit, or the factor by which a signal in another one, such as volts, comes in the first."""
     from lacuna.decimals import number
 
@@ -173,7 +178,7 @@ def _unit(column: str, allowed: list[str], told: str | None, is_time: bool) -> t
     while True:
         answer = typer.prompt(f"What is the unit of {column!r}? ({', '.join(allowed)}{other})", default=told)
         if answer in allowed:
-            return answer, 1.0
+            return answer, None
         if other and 0.0 < abs(scale := number(answer) or 0.0) < math.inf:
             return allowed[0], scale
         typer.echo(f"answer one of {', '.join(allowed)}{other}")

@@ -45,23 +45,38 @@ _PRESSURES = {unit: pascals / _PASCALS["psi"] for unit, pascals in _PASCALS.item
 UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": _SECONDS}  # by the suffix of a column's name
 _KNOWN = {unit for sizes in UNITS.values() for unit in sizes}
 _SPELLINGS = {  # of units, as programs write them, in lower case
-    "s": "sec sec. secs second seconds",
+    "s": "sec sec. secs second seconds sek sek. sekunde sekunden seconde secondes",
     "ms": "msec msecs millis millisecond milliseconds",
     "us": "µs usec µsec microsecond microseconds",
     "ns": "nsec nanosecond nanoseconds",
-    "min": "mins minute minutes",
-    "h": "hr hrs hour hours",
+    "min": "min. mins minute minutes minuten",
+    "h": "hr hrs hour hours stunde stunden heure heures",
     "m": "meter meters metre metres",
     "mm": "millimeter millimeters millimetre millimetres",
     "cm": "centimeter centimeters centimetre centimetres",
     "um": "µm micron microns micrometer micrometers micrometre micrometres",
-    "in": "inch inches in.",
+    "in": "inch inches in. zoll",
     "N": "newton newtons",
     "lbf": "lb lbs",
+    "kgf": "kg kp",
+    "gf": "g",
     "psi": "psig",
+    "bar": "barg",
+    "mbar": "mbarg",
+    "kPa": "kpag",
     "cmH2O": "cmh₂o",
 }
 _UNIT_ALIASES = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings.split()}
+_UNDECLARED = {  # units that a file may state, but none that can be declared, in lower case
+    "force": "cn dan mn tf oz ozf dyn kip",
+    "length": "ft feet foot mil mils yd nm",
+    "pressure": "torr atm ksi bara mbara psia kpaa",
+    "signals": "% ‰ v mv µv volt volts ma ° deg rad °c °f hz",
+}
+_OTHER_UNITS = {unit for units in _UNDECLARED.values() for unit in units.split()}
+_NO_UNITS = {"ts", "rn", "smp", "avg", "max", "std", "tot", "none"}  # in rows of units, by Campbell's loggers mostly
+_STATES_UNIT = re.compile(r"[^\W\d_]|[%‰°″\"]")
+_PRESSURE_OVER = re.compile(r"\b([km]?bar|kpa|psi)\s*[(\[]([ga])[)\]]", re.IGNORECASE)  # bar(g): gauge, absolute
 _ROWS = {"skip_rows": 0, "header_rows": 0, "units_rows": 0}  # and the minimum of each
 _CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ","), "thousands": (",", ".", "'", " ")}
 _TEXTS = ("header", "units_above", "encoding", "sheet")
@@ -69,7 +84,7 @@ _TABLES = ("columns", "units", "factor", "sign", "offset")  # keyed by the data 
 _KEYS = ("preset", *_CHOICES, "separator", *_TEXTS, *_ROWS, "above", *_TABLES, "where", "sync")
 _KEYS += ("rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]")
-_BEHIND = re.compile(r".*?(\S+?)\s*[/,]\s*([^/,]+)")
+_BEHIND = re.compile(r".*?(\S+?)(?:\s*[/,]\s*|\s+in\s+)([^/,]+)")
 _FRACTION = re.compile("[.,]%f")  # in the form of a date
 _BELOW_MICROSECONDS = re.compile(r"(?<=[.,]\d{6})\d+", re.ASCII)
 _CLOCK = re.compile("%([HM])([^%])(?:[^%]|%[MSf])*")  # the form of a time without a date
@@ -236,7 +251,7 @@ def _column(sheet: Sheet, export: Export, name: str, rows: np.ndarray) -> np.nda
         values = rows.astype(float)
     else:
         place = sheet.find(source)
-        _refuse_other_unit(sheet, place, name, unit)
+        _refuse_other_unit(sheet, place, name, export)
         values = sheet.numbers(place, source, rows)
     size = _sizes(name).get(unit, 1.0) if unit else 1.0
     if unit == FRAME and export.rate_hz is not None:
@@ -307,12 +322,19 @@ def _turns(text: str, form: str) -> tuple[timedelta, str]:
     return timedelta(days=int(found[1] or 0)) + turns * turn, f"{within}{text[found.end(2) :]}"
 
 
-def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:
-    """Refuse a declared unit that a file's row of units contradicts."""
-    written = unit_in_file(sheet, place)
-    if written and unit and unit in _sizes(name) and written != unit:
+def _refuse_other_unit(sheet: Sheet, place: int, name: str, export: Export) -> None:
+    """Refuse a unit that the file states and that is not the declared one. A factor tells what another one is."""
+    unit = export.units.get(name, "" if name in export.factor else name.rsplit("_", 1)[-1])
+    stated = unit_in_file(sheet, place)
+    if stated in (None, unit) or unit not in _sizes(name):
+        return
+    read = f"units.{name} is declared as {unit}" if name in export.units else f"{name} is read in {unit}"
+    if stated in _KNOWN:
+        raise sheet.error(f"the file says {stated}, but {read}: correct the declaration", -1, sheet.labels()[place])
+    if name not in export.factor:
         raise sheet.error(
-            f"the file says {written}, but units.{name} is declared as {unit}: correct the declaration",
+            f"the file says {stated!r}, but {read}: declare factor.{name}, how many {unit} one of them is; if it is no "
+            "unit, count its row among the rows of names (header_rows)",
             -1,
             sheet.labels()[place],
         )
@@ -320,17 +342,45 @@ def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) ->
 
 def unit_in_file(sheet: Sheet, place: int) -> str | None:
     """Return the unit that a file itself gives for a column: in a row of units, or in its name, in brackets or behind a
-    stroke or comma ("Kraft / kN", "load, kN")."""
+    stroke, a comma or "in" ("Kraft / kN", "load in kN"). One that cannot be declared is returned as written."""
+    rows = [cell for cell in sheet.units[place] if _STATES_UNIT.search(cell) and cell.lower() not in _NO_UNITS]
     last = "".join(sheet.names[place][-1:])
-    behind = _BEHIND.fullmatch(last)  # but not the "s" of "mm/s"
-    named = [last] if _BRACKETS.search(last) else [behind[2]] if behind and not _unit_called(behind[1]) else []
-    return next(filter(None, map(unit_in, (*sheet.units[place], *named))), None)
+    behind = _BEHIND.fullmatch(_BRACKETS.sub("", last).strip())
+    named = [last] if _BRACKETS.search(last) else []
+    named += [behind[2]] if behind and not is_unit(behind[1]) else []  # but not the "s" of "mm/s"
+    found = (unit_in(text) or _other_unit_in(text) for text in (*rows, *_before_brackets(rows), *named))
+    return next(filter(None, found), None) or next(iter(rows), None)
+
+
+def _before_brackets(cells: Iterable[str]) -> list[str]:
+    return [_BRACKETS.sub("", _PRESSURE_OVER.sub(r"\1\2", cell)).strip() for cell in cells]
 
 
 def unit_in(text: str) -> str | None:
     """Return the last unit that a text has in brackets or, without brackets, consists of; None if there is none."""
-    words = [_unit_called(word.strip()) for word in _BRACKETS.findall(text) or [text]]
-    return next(filter(None, reversed(words)), None)
+    return next(filter(None, map(_unit_called, reversed(_words(text)))), None)
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text states a unit as for `unit_in`, or one that cannot be declared."""
+    return unit_in(text) is not None or _other_unit_in(text) is not None
+
+
+def _other_unit_in(text: str) -> str | None:
+    return next(filter(_is_other_unit, reversed(_words(text))), None)
+
+
+def _is_other_unit(word: str) -> bool:
+    parts = [part.rstrip("0123456789²³^") for part in re.split("[/·*]", word)]
+    each = [part.lower() in _OTHER_UNITS or _unit_called(part) is not None for part in parts]
+    return word.lower() in _OTHER_UNITS or (len(parts) > 1 and all(each))
+
+
+def _words(text: str) -> list[str]:
+    """What may be a unit in a text: "N" in "Force (N, filtered)", or all of it if it has no brackets."""
+    text = _PRESSURE_OVER.sub(r"\1\2", text)
+    inside = [word for part in _BRACKETS.findall(text) for word in re.split("[,;]", part)]
+    return [word.strip().removeprefix("in ") for word in inside or [text]]
 
 
 def _unit_called(word: str) -> str | None:
@@ -339,7 +389,7 @@ def _unit_called(word: str) -> str | None:
     if word in _KNOWN:
         return word
     alike = {unit.lower(): unit for unit in _KNOWN - {"mN"} if len(unit) > 1}  # "MN" is not mN
-    return (alike | _UNIT_ALIASES).get(word.lower())
+    return (alike | _UNIT_ALIASES).get(word.lower() if len(word) > 1 else word)
 
 
 def _sizes(name: str) -> Mapping[str, float]:

@@ -97,7 +97,7 @@ class Sheet:
         above, heads, self._rows = self._workbook() if form.format == "xlsx" else self._text()
         header, units = heads[: len(heads) - form.units_rows], heads[len(heads) - form.units_rows :]
         if form.units_above is not None:
-            units = [*(cells for _, cells in self._labeled(form.units_above, above)[-1:]), *units]
+            units = [*(["", *cells[1:]] for _, cells in self._labeled(form.units_above, above)[-1:]), *units]
         width = max([len(row) for row in heads], default=0)
         width = width if form.header_rows else max(width, self._first_width())
         self.names = [_parts(header, place) for place in range(width)]

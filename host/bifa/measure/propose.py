@@ -14,7 +14,7 @@ from typing import Any
 import tomli_w
 
 from bifa.data.errors import DatasetError
-from bifa.data.export import ROLES, Export, parse_exports, presets, unit_in, unit_in_file, units_for
+from bifa.data.export import ROLES, ROW_NUMBER, Export, is_unit, parse_exports, presets, unit_in_file, units_for
 from bifa.data.fields import Fields, Source
 from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, is_datum, sheets, split_blanks
 from bifa.files import read_bytes
@@ -31,7 +31,6 @@ _NAME_PATTERNS = {  # names that a column may have, in the languages of the pres
     "force": (r"force|load|kraft", r"last|charge"),
 }
 _IN_BRACKETS = re.compile(r"\(.*\)|\[.*\]")
-_OTHER_UNITS = {"v", "mv", "volt", "volts", "%", "mm/mm", "°"}
 
 
 @dataclass(frozen=True)
@@ -58,9 +57,12 @@ class Look:
 
     def unit(self, name: str, column: str) -> str | None:
         """Return the unit that the file itself gives for a column, if it is a possible unit of `name`."""
-        place = self.sheet.find(column)
-        stated = unit_in_file(self.sheet, place)
+        stated = self.stated(column)
         return stated if stated in units_for(name) else None
+
+    def stated(self, column: str) -> str | None:
+        """Return the unit that the file itself gives for a column, or what it has in the place of one."""
+        return None if column == ROW_NUMBER else unit_in_file(self.sheet, self.sheet.find(column))
 
 
 def wanted(role: str) -> list[str]:
@@ -230,10 +232,7 @@ def _has_same_numbers(row: Sequence[str], other: Sequence[str], decimal: str) ->
 def _is_of_units(row: Sequence[str]) -> bool:
     written = [cell.strip() for cell in row if cell.strip()]
     alone = [cell.strip("()[] ") for cell in written]  # "Time [s]" is a name
-    return (
-        all(map(_IN_BRACKETS.fullmatch, written))
-        or sum(unit_in(cell) is not None or cell.lower() in _OTHER_UNITS for cell in alone) > len(written) / 2
-    )
+    return all(map(_IN_BRACKETS.fullmatch, written)) or sum(map(is_unit, alone)) > len(written) / 2
 
 
 def _preset(path: Path, role: str) -> str | None:

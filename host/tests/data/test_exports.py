@@ -205,6 +205,7 @@ def test_columns_without_names_are_known_by_their_places(tmp_path, text, form):
 CLOCK = DATED + 'date_format = "%H:%M:%S.%f"\n'
 DAY = DATED + 'date_format = "%I:%M:%S.%f %p"\n'
 COUNTED = named("[0]").replace('time_s = "s"', 'time_s = "frame"') + "rate_hz = 50\n"
+UNDECLARED = "[instrument.machine]\nunits_rows = 1\n"
 UNITS = "but units.force_N is declared as N"
 FIELDS = r"line {}: 4 fields, but 3 columns \({} is under none\); "
 ROWS = "t,x,F\n0,1,2\n1,2,3\n"
@@ -336,6 +337,21 @@ READ = {
         SIMPLE,
         [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
     ),
+    "what is in brackets or in a row of units, and no other unit": (
+        "t [Sek.],x (raw),F (N) (filtered),n\n,mm,N (mean),V\nTS,Smp,Avg,\n0,1,2,9\n1,2,3,9\n",
+        named("t [Sek.]", "x (raw)", "F (N) (filtered)") + "units_rows = 2\n",
+        [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
+    ),
+    "another unit with its factor": (
+        "t,x,F\nTicks,mil,daN\n0,1,2\n1,2,3\n",
+        SIMPLE + "units_rows = 1\nfactor = { time_s = 0.5, displacement_mm = 0.0254, force_N = 10 }\n",
+        [[0.0, 0.5], [0.0254, 0.0508], [20.0, 30.0]],
+    ),
+    "kilograms, weighed": (
+        "t,x,F\nSek,mm,kg\n0,1,2\n1,2,4\n",
+        SIMPLE.replace('"N"', '"kgf"') + "units_rows = 1\n",
+        [[0.0, 1.0], [1.0, 2.0], [19.6133, 39.2266]],
+    ),
     "a column's name alone is no unit": (
         "t,x,N\n0,1,2\n1,2,3\n",
         SIMPLE.replace('"N"', '"kN"').replace('"F"', '"N"'),
@@ -347,7 +363,7 @@ READ = {
 @pytest.mark.parametrize(("content", "declaration", "columns"), READ.values(), ids=READ)
 def test_a_file_is_read_as_it_is_declared(tmp_path, content, declaration, columns):
     found = read(tmp_path, content, declaration)
-    np.testing.assert_array_equal([found[key] for key in MACHINE], columns)
+    np.testing.assert_allclose([found[key] for key in MACHINE], columns, rtol=1e-15)
 
 
 def test_a_workbook_comes_in(tmp_path):
@@ -474,6 +490,41 @@ def test_a_workbook_comes_in(tmp_path):
         ("t,x,F (kN) Run #1\n0,1,2\n", named(force="F (kN) Run #1"), "the file says kN, " + UNITS),
         ("t,x,F (lbs)\n0,1,2\n", named(force="F (lbs)"), "the file says lbf, " + UNITS),
         ("t,x,F\nTS,mm,kN\n,Smp,Avg\n0,1,2\n", SIMPLE + "units_rows = 2\n", "the file says kN, " + UNITS),
+        ("t,x,Force (kg)\n0,1,2\n", named(force="Force (kg)"), "the file says kgf, " + UNITS),
+        ("t,x,Kraft in kN\n0,1,2\n", named(force="Kraft in kN"), "the file says kN, " + UNITS),
+        ('t,x,"F (kN, corrected)"\n0,1,2\n', named(force="F (kN, corrected)"), "the file says kN, " + UNITS),
+        (
+            "time_s,displacement_mm,force_N\ns,mm,kN\n0,1,2\n",
+            UNDECLARED,
+            "line 2, column force_N: .* kN, but force_N is read",
+        ),
+        *(
+            (
+                f"t,x,F ({unit})\n0,1,2\n",
+                named(force=f"F ({unit})"),
+                f"file says '{re.escape(unit)}', but units.force_N .* factor",
+            )
+            for unit in ("cN", "daN", "MN", "ozf", "V", "%", "N/mm", "kgf/cm2", "mm/s")
+        ),
+        *(
+            (
+                f"t,x,F\ns,mm,{unit}\n0,1,2\n",
+                SIMPLE + "units_rows = 1\n",
+                f"line 2, column F: the file says '{re.escape(unit)}', but",
+            )
+            for unit in ("cN", "daN", "MN", "ozf", "V", "kg m/s2", "raw", "%", "°", "牛顿")
+        ),
+        *(
+            (f"{time},{length},F\n0,1,2\n", named(time, length), "line 1, .*the file says")
+            for time, length in (
+                ("t [Min.]", "x"),
+                ("t (Stunden)", "x"),
+                ("t", "x [ft]"),
+                ("t", "x (mil)"),
+                ("t", "x (Zoll)"),
+                ("t", "x / %"),
+            )
+        ),
         ("t,x,N [N]\n0,1,2\n", named(force="N [N]").replace('"N"', '"kN"'), f"the file says N, {UNITS[:-1]}kN"),
         (
             ROWS + "\nMax,2.5,3\n",
@@ -807,14 +858,38 @@ def test_the_declarations_of_the_pages_are_valid(page):
         assert declarations(block, page)
 
 
+@pytest.mark.parametrize(
+    ("unit", "stated", "said"),
+    [
+        *(("kPa", other, rf"the file says '{re.escape(other)}', but") for other in ("torr", "atm", "kgf/cm2", "psia")),
+        ("kPa", "bar(a)", "the file says 'bara', but"),
+        ("bar", "bar(a)", "the file says 'bara', but"),
+        ("kPa", "bar(g)", "the file says bar, but"),
+        ("bar", "bar(g)", None),
+        ("psi", "psig", None),
+    ],
+)
+def test_pressures_in_another_unit_are_refused(tmp_path, unit, stated, said):
+    for name, row, units_rows in (("p", stated, 1), (f"p [{stated}]", "", 0)):
+        text = f'[instrument.machine]\nunits_rows = {units_rows}\ncolumns = {{ pressure_psi = "{name}" }}\n'
+        text += f'units = {{ pressure_psi = "{unit}" }}\n'
+        (tmp_path / "a.csv").write_text(f"{name}\n" + (f"{row}\n" if row else "") + "0\n2.5\n")
+        if said is None:
+            assert len(read_export(tmp_path / "a.csv", declared(text), ("pressure_psi",))[2]) == 2
+            continue
+        with pytest.raises(DatasetError, match=said):
+            read_export(tmp_path / "a.csv", declared(text), ("pressure_psi",))
+
+
 def test_units_in_a_line_above_the_names_have_to_agree(tmp_path):
     record = {key: RECORD[key] for key in MACHINE}
     path, export = write_export(tmp_path, "labview", record), by_preset("labview", "machine")
     whole = path.read_bytes()
-    for unit in (b"Newtons", b"kN"):
+    for unit in (b"Newtons", b"kN", b"Volts"):
         path.write_bytes(whole.replace(b"X_Dimension", b"Y_Unit_Label\tmm\t" + unit + b"\r\nX_Dimension"))
-        if unit == b"kN":
-            with pytest.raises(DatasetError, match=r"Force: the file says kN, but units.force_N is declared as N"):
+        if unit != b"Newtons":
+            said = rf"Force: the file says '?{unit.decode()}'?, but units.force_N is declared as N"
+            with pytest.raises(DatasetError, match=said):
                 read_export(path, export, MACHINE)
         else:
             np.testing.assert_allclose(read_export(path, export, MACHINE)[0]["force_N"], record["force_N"], atol=1e-6)

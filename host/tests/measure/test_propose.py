@@ -81,6 +81,19 @@ def test_a_signal_in_volts_is_declared_by_its_factor(tmp_path):
     assert found["displacement_mm"].tolist() == [3.75, 0.625, 1.25]
 
 
+@pytest.mark.parametrize(("unit", "asked_for"), [("kg", "[kgf]"), ("daN", None)])
+def test_no_unit_but_that_of_the_file_is_proposed(tmp_path, unit, asked_for):
+    path = write_export(tmp_path, "trapezium", MACHINE)
+    path.write_bytes(path.read_bytes().replace(b'"N"', f'"{unit}"'.encode()))
+    said = told(path, tmp_path, "y", "", "", "", "", "n", "", "kgf" if asked_for else "10", "n", "file", "y")
+    question = said.partition("What is the unit of 'Force'")[2].splitlines()[0]
+    assert asked_for in question if asked_for else "[" not in question
+    assert asked_for or f"The file says '{unit}' for 'Force', which is none of the units." in said
+    export = read_exports(tmp_path / "bench.toml")["machine"]
+    found, _, _ = read_export(path, export, ("force_N",))
+    np.testing.assert_allclose(found["force_N"], (9.80665 if asked_for else 10.0) * MACHINE["force_N"], atol=1e-5)
+
+
 def test_the_table_of_a_preset_is_shown_though_another_is_longer(tmp_path):
     path = tmp_path / "take.csv"
     devices = "Devices\n1000\n,,Plate,,,,\nFrame,Sub Frame,Fx,Fy,Fz,Mx,My\n,,N,N,N,,\n" + "1,0,1,2,3,4,5\n" * 40
