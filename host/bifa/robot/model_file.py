@@ -22,6 +22,7 @@ from bifa.toml import parse_toml
 FORMAT = 1
 _FURTHEST_M = 1.0  # of a spring: one in millimetres, which would walk as well, is outside
 _MOST_SCATTER = 1e6
+_EARLIER = "switch_error_s"  # in the scatter of earlier versions
 
 
 class ModelFileError(BifaError):
@@ -102,6 +103,10 @@ def _build(document: dict[str, Any]) -> Model:
     effects, learnt = _tables(document, "effects"), _tables(document, "learnt")
     for name, entry in learnt.items():
         _only(entry, f"learnt.{name}", {"lower", "upper", "values"})
+        try:
+            _numbers(list(entry.values()))
+        except TypeError:
+            raise ModelFileError(f"learnt.{name} must hold numbers, its values in rows") from None
     return Model(
         name=str(document["name"]),
         parameters={name: _parameter(name, entries[name]) for name in BASE_PARAMETERS},
@@ -129,7 +134,7 @@ def _read_covariance(entry: dict[str, Any]) -> Covariance:
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ModelFileError("covariance.names must be a list of names")
     try:
-        return Covariance(tuple(names), np.array(matrix, dtype=float))
+        return Covariance(tuple(names), np.array(_numbers(matrix), dtype=float))
     except (TypeError, ValueError, OverflowError):
         raise ModelFileError("covariance.matrix must be a square matrix of numbers, with one row per name") from None
 
@@ -140,17 +145,17 @@ def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
     if entry.get("unit", base.unit) != base.unit:
         raise ModelFileError(f"parameters.{name} is in {base.unit!r}, not {entry['unit']!r}")
     sd = entry.get("sd")
-    if sd is not None and not (isinstance(sd, (int, float)) and 0 <= sd < math.inf):
+    if sd is not None and not (isinstance(sd, (int, float)) and not isinstance(sd, bool) and 0 <= sd < math.inf):
         raise ModelFileError(f"parameters.{name}.sd must be a number, at least 0")
     return base.with_value(entry["value"], sd=sd, source=str(entry.get("source", base.source)))
 
 
 def _read_scatter(entry: dict[str, Any]) -> Scatter:
-    entry = {name: value for name, value in entry.items() if name != "switch_error_s"}  # of earlier versions
-    _only(entry, "scatter", set(), {field.name for field in fields(Scatter)})
-    for name, value in entry.items():
+    _only(entry, "scatter", set(), {field.name for field in fields(Scatter)} | {_EARLIER})
+    numbers = {name: value for name, value in entry.items() if name != _EARLIER}
+    for name, value in numbers.items():
         check_range(ModelFileError, f"scatter.{name}", value, 0.0, _MOST_SCATTER)
-    return Scatter(**{name: float(value) for name, value in entry.items()})
+    return Scatter(**{name: float(value) for name, value in numbers.items()})
 
 
 def _read_curve(name: str, entry: dict[str, Any]) -> StiffnessCurve:
@@ -158,12 +163,23 @@ def _read_curve(name: str, entry: dict[str, Any]) -> StiffnessCurve:
     for end in ("lower_m", "upper_m"):
         check_range(ModelFileError, f"stiffness.{name}.{end}", entry[end], -_FURTHEST_M, _FURTHEST_M, "m")
     try:
-        coefficients = tuple(float(value) for value in entry["coefficients"])
+        coefficients = tuple(float(value) for value in _numbers(entry["coefficients"]))
     except (TypeError, ValueError, OverflowError):
         raise ModelFileError(f"stiffness.{name} must hold numbers") from None
     curve = StiffnessCurve(coefficients, float(entry["lower_m"]), float(entry["upper_m"]))
     curve.equilibria_m  # noqa: B018 - raises if the curve is not bistable
     return curve
+
+
+def _numbers(values: Any) -> Any:
+    """Return `values`, a list of numbers or of such lists. Raises TypeError if they hold anything else, such as the
+    text or the truth values that float and NumPy would convert."""
+    if not isinstance(values, list):
+        raise TypeError
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            _numbers(value)
+    return values
 
 
 def _only(table: dict[str, Any], where: str, required: set[str], optional: Set[str] = frozenset()) -> None:

@@ -18,6 +18,10 @@ from harness.tampered import tampered
 
 _LEARNT = "[learnt.{}]\nlower = 0.0\nupper = 1.0\nvalues = {}"
 INSERTED = {
+    "text in a covariance": ('[covariance]\nnames = ["mu_k"]\nmatrix = [["1"]]', "must be a square matrix of numbers"),
+    "true in a covariance": ('[covariance]\nnames = ["mu_k"]\nmatrix = [[true]]', "must be a square matrix of numbers"),
+    "text in a learnt curve": (_LEARNT.format("body_damper", '[["1", 1.0]]'), "rows"),
+    "true in a learnt curve": (_LEARNT.format("body_damper", "[[true, 1.0]]"), "rows"),
     "unknown effect": ("[effects.magic]\nsize = 1.0", "magic"),
     "no such learnt curve": (_LEARNT.format("magic", "[[0.0, 1.0]]"), "magic"),
     "learnt rows": (_LEARNT.format("filling", "[[0.0, 1.0]]"), "1 rows instead of 2"),
@@ -49,6 +53,10 @@ CHANGED = {
     "wrong unit": ('unit = "N/psi"', 'unit = "N/bar"', "N/bar"),
     "in millimetres": ("lower_m = -0.006", "lower_m = -6.0", LOWER + "-6.0 is outside its range -1 to 1 m"),
     "text for a number": ("lower_m = -0.006", 'lower_m = "-0.006"', LOWER + "'-0.006' is not a number"),
+    "scatter that is a number": ("format = 1", "format = 1\nscatter = 0.05", "scatter must be a table"),
+    "text for a coefficient": ("-139.2774809279526", '"12"', "stiffness.body must hold numbers"),
+    "true for a coefficient": ("-139.2774809279526", "true", "stiffness.body must hold numbers"),
+    "true for a spread": ("value = 0.175", "value = 0.175\nsd = true", "head_mass_kg.sd must be a number"),
     "no float": ("-139.2774809279526", f"1{400 * '0'}", "stiffness.body must hold numbers"),
     "not TOML": ("format = 1", "format = ", "TOML"),
     "not bistable": ("-139.2774809279526", "1e9", "bistable"),
