@@ -13,6 +13,7 @@ Only what is declared is read, and nothing is guessed: a column under another na
 a row of units, it has to agree.
 """
 
+import codecs
 import itertools
 import re
 import tomllib
@@ -31,7 +32,7 @@ from lacuna.errors import listed
 
 from .fields import Fields
 from .layout import EXPERIMENTS, is_command
-from .sheet import SEPARATORS, Sheet, SheetForm
+from .sheet import BLANK, SEPARATORS, Sheet, SheetForm
 
 MACHINE, CAMERA = "machine", "camera"
 ROLES = {"static_loading": MACHINE, "anchor_pull": MACHINE, "step_response": CAMERA, "locomotion": CAMERA}
@@ -78,7 +79,7 @@ _NO_UNITS = {"ts", "rn", "smp", "avg", "max", "std", "tot", "none"}  # in rows o
 _STATES_UNIT = re.compile(r"[^\W\d_]|[%‰°″\"]")
 _PRESSURE_OVER = re.compile(r"\b([km]?bar|kpa|psi)\s*[(\[]([ga])[)\]]", re.IGNORECASE)  # bar(g): gauge, absolute
 _ROWS = {"skip_rows": 0, "header_rows": 0, "units_rows": 0}  # and the minimum of each
-_CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ","), "thousands": (",", ".", "'", " ")}
+_CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ","), "thousands": (",", ".", "'", BLANK)}
 _TEXTS = ("header", "units_above", "encoding", "sheet")
 _TABLES = ("columns", "units", "factor", "sign", "offset")  # keyed by the data set's columns
 _KEYS = ("preset", *_CHOICES, "separator", *_TEXTS, *_ROWS, "above", *_TABLES, "where", "sync")
@@ -86,6 +87,7 @@ _KEYS += ("rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]")
 _BEHIND = re.compile(r".*?(\S+?)(?:\s*[/,]\s*|\s+in\s+)([^/,]+)")
 _FRACTION = re.compile("[.,]%f")  # in the form of a date
+_PLAIN = b"0123456789+-.,;\t\n"
 _BELOW_MICROSECONDS = re.compile(r"(?<=[.,]\d{6})\d+", re.ASCII)
 _CLOCK = re.compile("%([HM])([^%])(?:[^%]|%[MSf])*")  # the form of a time without a date
 _YEAR_OF_TIMES = 1900  # of dates that name none, by strptime
@@ -271,7 +273,7 @@ def _moments(sheet: Sheet, export: Export, source: str, rows: np.ndarray) -> lis
     for row, cell in zip(rows, cells, strict=False):
         try:
             moments.append(_moment(cell, export.date_format, zone))
-        except ValueError:
+        except (ValueError, OverflowError):  # before the year 1 or after 9999, in UTC
             form = f"of the form {export.date_format!r}" if export.date_format else "in ISO 8601 format (date_format)"
             raise sheet.error(f"{cell!r} is not a date {form}{sheet.another_table(row)}", row, source) from None
     _refuse_midnight(sheet, moments, rows, source)
@@ -415,8 +417,7 @@ def parse_export(fields: Fields, name: str) -> Export:
     given |= {key: fields.text(key) for key in ("date_format", "zone") if key in fields}
     export = Export(name, sheet, **given)
     fields.finish(also=_KEYS)
-    if "%p" in (form := export.date_format or "") and "%I" not in form:
-        raise fields.error("date_format", "%p (AM or PM) counts only beside %I: write %I instead of %H")
+    _check_date_format(fields, export.date_format or "")
     try:
         if export.zone:
             ZoneInfo(export.zone)
@@ -428,6 +429,19 @@ def parse_export(fields: Fields, name: str) -> Export:
     if export.where and ROW_NUMBER in export.columns.values():
         raise fields.error("where", f"leaves rows out, which {ROW_NUMBER} would count: declare a column with the time")
     return export
+
+
+def _check_date_format(fields: Fields, form: str) -> None:
+    if "%p" in form and "%I" not in form:
+        raise fields.error("date_format", "%p (AM or PM) counts only beside %I: write %I instead of %H")
+    try:
+        datetime.strptime("", form)
+    except re.error:
+        problem = f"{form!r} has a part twice: %m is the month, %M the minute; %d the day, %H the hour"
+        raise fields.error("date_format", problem) from None
+    except ValueError as error:
+        if "directive" in str(error) or "stray" in str(error):
+            raise fields.error("date_format", f"{error}: write it as for Python's strptime") from None
 
 
 def _sync(fields: Fields) -> dict[str, Any]:
@@ -452,14 +466,25 @@ def _form(fields: Fields) -> SheetForm:
     how["separator"] = SEPARATORS.get(str(mark), mark)
     if how["separator"] not in SEPARATORS.values():
         raise fields.error("separator", f"must be one of {', '.join(SEPARATORS)}, or that character")
-    between = how.get("thousands")  # numbers in quotes may have the comma that separates cells, as may decimals
-    if between and (between == how.get("decimal", ".") or between == how["separator"] != ","):
+    between = how.get(
+        "thousands"
+    )  # numbers in quotes may have the comma that separates cells, as may decimals; a blank, a no-break one
+    if between and (
+        between == how.get("decimal", ".") or (between == how["separator"] and between not in (",", BLANK))
+    ):
         raise fields.error("thousands", "must be another character than the decimal sign and the separator")
-    try:
-        "".encode(how.get("encoding", "utf-8"))
-    except LookupError:
-        raise fields.error("encoding", f"{how['encoding']!r} is unknown; utf-8, cp1252, latin-1, utf-16 ...") from None
+    if not _is_of_text(how.get("encoding", "utf-8")):
+        raise fields.error("encoding", f"{how['encoding']!r} is unknown; utf-8, cp1252, latin-1, utf-16 ...")
     return SheetForm(**how)
+
+
+def _is_of_text(encoding: str) -> bool:
+    """Whether Python knows the encoding, and files in it can be split at line breaks and separators."""
+    try:
+        is_ascii = _PLAIN.decode(encoding, "replace") == _PLAIN.decode("ascii")
+        return is_ascii or codecs.lookup(encoding).name.startswith(("utf-16", "utf-32"))  # which are converted first
+    except (LookupError, UnicodeError):  # "undefined", "idna"
+        return False
 
 
 def _cells_above(fields: Fields) -> tuple[str, ...]:

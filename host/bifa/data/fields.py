@@ -96,7 +96,7 @@ class Fields:
 
     def choice(self, key: str, allowed: tuple[str, ...]) -> str:
         """Take one of the strings `allowed`."""
-        value = self.text(key)
+        value: str = self.take(key, str, "a string")
         if value not in allowed:
             raise self.error(key, f"{value!r} is unknown; it must be one of {', '.join(allowed)}")
         return value

@@ -28,6 +28,10 @@ _NAMES_OF = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
 _BETWEEN_CELLS = "\x1f"  # of a workbook's row as text
 _HEAD = 1 << 18  # bytes in which a header has to be found
 _MAX_LISTED = 8
+BLANK = " "
+_THOUSANDS = {BLANK: " \u00a0\u202f\u2009", "'": "'\u2019"}  # signs that stand for the one declared
+_CELL_BLANKS = BLANKS + "\u00a0\u202f\u2009"
+_MINUS = "\N{MINUS SIGN}"
 _DATUM = re.compile(r"[-+.,]?\d")  # how numbers, dates and times begin
 _PLACE = re.compile(r"(?:(.+) )?\[([1-9]\d*)\]", re.ASCII)  # "X [2]", the second X; "[2]", the second of all
 _DAY = r"\d{1,4}[-/.](\d{1,2}|[a-z]{3})[-/.]\d{1,4}"
@@ -76,7 +80,7 @@ def number_in(cell: str, mark: str, between: str | None = None) -> float | None:
     """Return the number in a cell with the decimal sign `mark` and, if given, the sign `between` groups of three
     digits; None if it holds anything else."""
     if between is not None:
-        cell = _grouped(between).sub(lambda digits: digits[0].replace(between, ""), cell, count=1)
+        cell = _grouped(between).sub(lambda digits: re.sub(f"[{_marks(between)}]", "", digits[0]), cell, count=1)
     if mark == ".":
         return number(cell)
     return None if "." in cell else number(cell.replace(mark, "."))
@@ -418,14 +422,14 @@ class Sheet:
             cells = _marked(self._frame.iloc[row], self._form.decimal)
         else:
             cells = self._written(row)
-        return not any(cells[place].strip(BLANKS) for place in places if place < len(cells))
+        return not any(cells[place].strip(_CELL_BLANKS) for place in places if place < len(cells))
 
     def _read(self, cell: str) -> float | None:
         """The number in a cell as declared, or None."""
         return number_in(cell, self._form.decimal, self._form.thousands)
 
     def _number(self, cell: str, row: int, name: str) -> float:
-        cell = cell.strip(BLANKS)
+        cell = cell.strip(_CELL_BLANKS)
         found = self._read(cell)
         if found is None and cell:
             problem = f"{_shown(cell)} is not a number{self._hint(cell) or self.another_table(row)}"
@@ -435,6 +439,12 @@ class Sheet:
     def _hint(self, cell: str) -> str:
         """What to do about a number that is written in another way than declared; "" if it is none."""
         mark = self._form.decimal
+        if _MINUS in cell and self._read(cell.replace(_MINUS, "-")) is not None:
+            return "; its minus sign is a typographic one (U+2212): replace it by a hyphen (-)"
+        for between, marks in _THOUSANDS.items():
+            if re.search(f"[{marks}]", cell) and number_in(cell, mark, between) is not None:
+                called = {BLANK: "blanks", "'": "apostrophes"}[between]
+                return f'; {called} between thousands? Declare thousands = "{between}"'
         if decimal(cell.replace("," if mark == "." else ".", "").replace(mark, ".")) is None:
             return ""
         if mark == ",":
@@ -507,8 +517,12 @@ class Sheet:
 @cache
 def _grouped(between: str) -> re.Pattern[str]:
     """Numbers whose integer digits are in groups of three."""
-    mark = re.escape(between)
+    mark = f"[{_marks(between)}]"
     return re.compile(rf"^[+-]?[1-9]\d{{0,2}}({mark}\d{{3}})+(?!\d|{mark})", re.ASCII)
+
+
+def _marks(between: str) -> str:
+    return _THOUSANDS.get(between, between)
 
 
 def _exact() -> dict[str, str]:

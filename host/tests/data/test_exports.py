@@ -352,6 +352,24 @@ READ = {
         SIMPLE.replace('"N"', '"kgf"') + "units_rows = 1\n",
         [[0.0, 1.0], [1.0, 2.0], [19.6133, 39.2266]],
     ),
+    **{
+        f"blanks between groups of digits ({ord(blank):x})": (
+            f"t;x;F\n0;-1{blank}234,5;2{blank}\n1;2{blank}345{blank}678;{blank}3\n",
+            SIMPLE + COMMAS + 'thousands = " "\n',
+            [[0.0, 1.0], [-1234.5, 2345678.0], [2.0, 3.0]],
+        )
+        for blank in " \u00a0\u202f\u2009"
+    },
+    "no-break spaces between groups of digits, and blanks between columns": (
+        "t x F\n0 1\u00a0234.5 2\n1 2 3\n",
+        SIMPLE + SPACES + 'thousands = " "\n',
+        [[0.0, 1.0], [1234.5, 2.0], [2.0, 3.0]],
+    ),
+    "apostrophes between groups of digits": (
+        "t,x,F\n0,1'234.5,2\n1,1\u2019234\u2019567.5,3\n",
+        SIMPLE + 'thousands = "\'"\n',
+        [[0.0, 1.0], [1234.5, 1234567.5], [2.0, 3.0]],
+    ),
     "a column's name alone is no unit": (
         "t,x,N\n0,1,2\n1,2,3\n",
         SIMPLE.replace('"N"', '"kN"').replace('"F"', '"N"'),
@@ -474,6 +492,22 @@ def test_a_workbook_comes_in(tmp_path):
                 f"line 3, column x: '{re.escape(cell)}' is not a number; decimal points",
             )
             for cell in (".125", "-.5", "+.5", "1.")
+        ),
+        *(
+            (f"t;x;F\n0;1;2\n1;{cell};3\n", SIMPLE + COMMAS, f"line 3, column x: .* is not a number; {said}")
+            for cell, said in (
+                *((f"1{blank}234,5", 'blanks .* Declare thousands = " "') for blank in " \u00a0\u202f\u2009"),
+                *((f"1{mark}234,5", 'apostrophes .* Declare thousands = "\'"') for mark in "'\u2019"),
+                ("\u22121,5", "its minus sign is a typographic one .*replace it by a hyphen"),
+            )
+        ),
+        *(
+            (f"t,x,F\n{date},1,2\n", DATED + zone, f"line 2, column t: '{re.escape(date)}' is not a date")
+            for date, zone in (
+                ("0001-01-01T00:00:00", 'zone = "Europe/Berlin"\n'),
+                ("0001-01-01T00:00:00+05:00", ""),
+                ("9999-12-31T23:59:59", 'zone = "America/New_York"\n'),
+            )
         ),
         ('t,x,F\n0,1,2\n1,"1,234.567,8",3\n', SIMPLE + 'thousands = ","\n', "'1,234.567,8' is not a number"),
         *(
@@ -690,9 +724,18 @@ def test_an_export_that_states_another_rate_or_unit_than_its_preset_is_refused(
         (SIMPLE + 'above = "Length Units,Meters"\n', r"above: must be a list of cells as text, such"),
         (SIMPLE + 'above = ["Trajectories", 100]\n', r"above: must be a list of cells as text"),
         (SIMPLE + 'date_format = "%d/%m/%Y %H:%M:%S %p"\n', r"date_format: %p .* counts only beside %I"),
+        (
+            SIMPLE + 'date_format = "%d/%m/%Y %H:%m:%S"\n',
+            r"date_format: .* has a part twice: %m is the month, %M the min",
+        ),
+        (SIMPLE + 'date_format = "%d/%m/%Y %Q"\n', r"date_format: 'Q' is a bad directive"),
+        (SIMPLE + 'thousands = "\u00a0"\n', r"thousands: '\\xa0' is unknown; it must be one of"),
         (SIMPLE + "skip_rows = -2\n", r"skip_rows: -2 is outside"),
         (SIMPLE + 'preset = "bluehil"\n', r"preset: 'bluehil' is unknown; it must be one of arduino"),
-        (SIMPLE + 'encoding = "latin1-de"\n', r"encoding: 'latin1-de' is unknown"),
+        *(
+            (SIMPLE + f'encoding = "{encoding}"\n', rf"encoding: '{encoding}' is unknown")
+            for encoding in ("latin1-de", "undefined", "idna", "punycode", "cp037", "base64")
+        ),
         (SIMPLE + 'separator = "|"\n', r"separator: must be one of comma"),
         (SIMPLE + 'thousands = "."\n', r"thousands: must be another character"),
         (COUNTED + "where = { body = 1 }\n", r"where: leaves rows out, which \[0\] would count"),
