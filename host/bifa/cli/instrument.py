@@ -1,6 +1,7 @@
 """`bifa instrument`: declare the format of an instrument's files, proposed from one of them and confirmed by you."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -112,8 +113,8 @@ def _ask_declaration(console: Console, seen: "Look", role: str) -> dict[str, Any
 
     preset = seen.presets.get(role)
     if preset and not typer.confirm(f"Use the preset {preset}?", default=True):
-        preset = None
-    given = parsed(role, {"preset": preset}) if preset else None
+        preset, seen = None, replace(seen, sheet=seen.without_preset)
+    given = parsed(role, seen.by_preset(role)) if preset else None
     columns: dict[str, str] = {}
     units: dict[str, str] = {}
     more: dict[str, Any] = {}
@@ -139,7 +140,7 @@ def _ask_declaration(console: Console, seen: "Look", role: str) -> dict[str, Any
         if name != "time_s" and typer.confirm(f"Reverse the sign of {name}?", default=False):
             changes["sign"][name] = -1
         more |= _clock(units[name], given) if name == "time_s" else {}
-    table: dict[str, Any] = {"preset": preset} if preset else dict(seen.how)
+    table: dict[str, Any] = seen.by_preset(role) if preset else dict(seen.how)
     if not given or any(given.columns.get(n) != c or given.units.get(n) != units[n] for n, c in columns.items()):
         table |= {"columns": columns, "units": units}
     table |= {key: value for key, value in more.items() if not given or getattr(given, key) != value}

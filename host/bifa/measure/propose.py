@@ -36,11 +36,16 @@ _IN_BRACKETS = re.compile(r"\(.*\)|\[.*\]")
 @dataclass(frozen=True)
 class Look:
     """Result of inspecting a file: how it is written (the keys of a declaration that differ from the defaults), its
-    sheet, and the presets that read it, by role."""
+    sheet (as a preset reads it, if there is one), the presets that read it, by role, and the sheet without a preset."""
 
     how: Mapping[str, Any]
     sheet: Sheet
     presets: Mapping[str, str]
+    without_preset: Sheet
+
+    def by_preset(self, role: str) -> dict[str, Any]:
+        """Return a declaration by the preset for this role, and what the file has otherwise."""
+        return _by_preset(role, self.presets[role], self.how)
 
     def rows(self) -> list[list[str]]:
         """Return the first rows as written in the file."""
@@ -76,11 +81,18 @@ def look(path: Path) -> Look:
     how = _workbook(path) if path.suffix.lower() == ".xlsx" else _text(path)
     form = SheetForm(**{**how, "separator": SEPARATORS.get(how.get("separator", "comma"), ",")})
     presets = {role: name for role in ("machine", "camera") if (name := _preset(path, role))}
-    sheet = Sheet(path, form)
+    sheet = without_preset = Sheet(path, form)
     for role, name in presets.items():
-        by_preset = Sheet(path, parsed(role, {"preset": name}).form)
-        sheet = by_preset if by_preset.first != sheet.first else sheet  # the longest run of numbers is another table
-    return Look(how, sheet, presets)
+        sheet = Sheet(path, parsed(role, _by_preset(role, name, how)).form)
+    return Look(how, sheet, presets, without_preset)
+
+
+def _by_preset(role: str, name: str, how: Mapping[str, Any]) -> dict[str, Any]:
+    form = parsed(role, {"preset": name}).form
+    seen = {key: how[key] for key in ("decimal", "encoding") if key in how and how[key] != getattr(form, key)}
+    if seen.get("decimal") == form.thousands:  # "1,234": of the two, the preset's is meant
+        seen.pop("decimal", None)
+    return {"preset": name} | seen
 
 
 def declaration(role: str, table: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ from bifa.data.export import read_export
 from bifa.files import TargetError
 from bifa.measure.bench_file import read_exports
 from bifa.measure.propose import declaration, look, parsed
+from bifa.toml import parse_toml
 from harness.exports import CAMERAS, MACHINES, preset_of, write_export
 
 TIME_S = np.round(np.arange(0.0, 1.0, 0.01), 6)
@@ -110,6 +111,42 @@ def test_a_preset_that_fits_is_offered_and_kept_short(tmp_path):
     assert "⠐" in said or "*" in said or "⣀" in said, "each column is plotted"
     text = (tmp_path / "bench.toml").read_text()
     assert text == '[known]\nhead_mass_kg = 0.18\n\n[instrument.machine]\npreset = "testxpert"\n'
+
+
+def test_what_a_file_has_other_than_its_preset_is_declared_beside_it(tmp_path):
+    """A German LabVIEW writes decimal commas, and units above the names."""
+    path = write_export(tmp_path, "labview", MACHINE)
+    text = path.read_text().replace("X_Dimension", "Y_Unit_Label\tcm\tkg\nX_Dimension")
+    above, header, rows = text.partition("X_Value")
+    path.write_text(above + header + rows.replace(".", ","))
+    said = told(path, tmp_path, "y", *8 * ("",), "file", "y")
+    assert "'Displacement'? (mm, m, cm, in, um; or a number, how many mm one of the file's is) [cm]" in said
+    expected = {
+        "preset": "labview",
+        "decimal": ",",
+        "units": {"time_s": "s", "displacement_mm": "cm", "force_N": "kgf"},
+    }
+    declared = parse_toml((tmp_path / "bench.toml").read_text())["instrument"]["machine"]
+    assert {key: declared[key] for key in expected} == expected
+    found, _, _ = read_export(path, read_exports(tmp_path / "bench.toml")["machine"], ("time_s", "force_N"))
+    np.testing.assert_allclose(found["force_N"], 9.80665 * MACHINE["force_N"], atol=1e-5)
+
+
+def test_a_preset_that_is_declined_leaves_what_was_detected(tmp_path):
+    path = write_export(tmp_path, "labview", MACHINE)
+    told(path, tmp_path, "n", "", "s", "", "mm", "n", "", "N", "n", "file", "y")
+    export = read_exports(tmp_path / "bench.toml")["machine"]
+    assert export.form.units_above is None
+    found, _, _ = read_export(path, export, ("time_s", "force_N"))
+    np.testing.assert_allclose(found["force_N"], MACHINE["force_N"], atol=1e-5)
+
+
+def test_groups_of_digits_are_no_decimals_if_the_preset_says_so(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("Time,Extension,Load\n(s),(mm),(N)\n" + "".join(f'{t},"1,23{t}","5,67{t}"\n' for t in range(5)))
+    seen = look(path)
+    assert seen.by_preset("machine") == {"preset": "bluehill"}
+    assert seen.sheet.numbers(1, "Extension").tolist() == [1230.0, 1231.0, 1232.0, 1233.0, 1234.0]
 
 
 def test_a_column_that_the_preset_does_not_know_is_proposed_by_its_name(tmp_path):
