@@ -75,7 +75,17 @@ _UNDECLARED = {  # units that a file may state, but none that can be declared, i
     "signals": "% ‰ v mv µv volt volts ma ° deg rad °c °f hz",
 }
 _OTHER_UNITS = {unit for units in _UNDECLARED.values() for unit in units.split()}
-_NO_UNITS = {"ts", "rn", "smp", "avg", "max", "std", "tot", "none"}  # in rows of units, by Campbell's loggers mostly
+_NO_UNITS = {
+    "ts",
+    "rn",
+    "smp",
+    "avg",
+    "max",
+    "std",
+    "tot",
+    "none",
+    "n/a",
+}  # in rows of units, by Campbell's loggers mostly
 _STATES_UNIT = re.compile(r"[^\W\d_]|[%‰°″\"]")
 _PRESSURE_OVER = re.compile(r"\b([km]?bar|kpa|psi)\s*[(\[]([ga])[)\]]", re.IGNORECASE)  # bar(g): gauge, absolute
 _ROWS = {"skip_rows": 0, "header_rows": 0, "units_rows": 0}  # and the minimum of each
@@ -345,7 +355,8 @@ def _refuse_other_unit(sheet: Sheet, place: int, name: str, export: Export) -> N
 def unit_in_file(sheet: Sheet, place: int) -> str | None:
     """Return the unit that a file itself gives for a column: in a row of units, or in its name, in brackets or behind a
     stroke, a comma or "in" ("Kraft / kN", "load in kN"). One that cannot be declared is returned as written."""
-    rows = [cell for cell in sheet.units[place] if _STATES_UNIT.search(cell) and cell.lower() not in _NO_UNITS]
+    rows = [cell for cell in sheet.units[place] if _STATES_UNIT.search(cell)]
+    rows = [cell for cell in rows if cell.strip("()[] ").lower() not in _NO_UNITS]
     last = "".join(sheet.names[place][-1:])
     behind = _BEHIND.fullmatch(_BRACKETS.sub("", last).strip())
     named = [last] if _BRACKETS.search(last) else []

@@ -480,7 +480,9 @@ class Sheet:
     def refuse_short_lines(self, rows: np.ndarray) -> None:
         """Refuse a line of fewer cells than the lines before and after it among `rows`: those to the right of a lost
         cell would count as the columns before."""
-        if self._form.format == "xlsx" or self._form.separator == " " or self._frame.iloc[rows, -1].notna().all():
+        if self._form.format == "xlsx" or self._form.separator == " ":
+            return
+        if not len(rows) or self._frame.iloc[rows, -1].notna().all():
             return
         counts = [self._count(int(row)) for row in rows]
         for row, before, count, after in zip(rows, [len(self.names), *counts], counts, counts[1:], strict=False):

@@ -338,7 +338,7 @@ READ = {
         [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
     ),
     "what is in brackets or in a row of units, and no other unit": (
-        "t [Sek.],x (raw),F (N) (filtered),n\n,mm,N (mean),V\nTS,Smp,Avg,\n0,1,2,9\n1,2,3,9\n",
+        "t [Sek.],x (raw),F (N) (filtered),n\n,mm,N (mean),V\nTS,Smp,(N/A),\n0,1,2,9\n1,2,3,9\n",
         named("t [Sek.]", "x (raw)", "F (N) (filtered)") + "units_rows = 2\n",
         [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]],
     ),

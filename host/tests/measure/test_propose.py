@@ -132,6 +132,13 @@ def test_what_a_file_has_other_than_its_preset_is_declared_beside_it(tmp_path):
     np.testing.assert_allclose(found["force_N"], 9.80665 * MACHINE["force_N"], atol=1e-5)
 
 
+def test_a_preset_whose_row_of_units_would_be_a_sample_is_not_offered(tmp_path):
+    rows = "".join(f"10:00:0{k}.00,0.{k},0.2\n" for k in range(5))
+    (tmp_path / "a.csv").write_text(f"Time,Load,Extension\n{rows}")
+    seen = look(tmp_path / "a.csv")
+    assert (seen.presets, len(seen.sheet)) == ({}, 5)
+
+
 def test_a_preset_that_is_declined_leaves_what_was_detected(tmp_path):
     path = write_export(tmp_path, "labview", MACHINE)
     told(path, tmp_path, "n", "", "s", "", "mm", "n", "", "N", "n", "file", "y")
