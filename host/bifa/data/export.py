@@ -75,17 +75,7 @@ _UNDECLARED = {  # units that a file may state, but none that can be declared, i
     "signals": "% ‰ v mv µv volt volts ma ° deg rad °c °f hz",
 }
 _OTHER_UNITS = {unit for units in _UNDECLARED.values() for unit in units.split()}
-_NO_UNITS = {
-    "ts",
-    "rn",
-    "smp",
-    "avg",
-    "max",
-    "std",
-    "tot",
-    "none",
-    "n/a",
-}  # in rows of units, by Campbell's loggers mostly
+_NO_UNITS = ("ts", "rn", "smp", "avg", "max", "std", "tot", "none", "n/a")  # in rows of units, by loggers mostly
 _STATES_UNIT = re.compile(r"[^\W\d_]|[%‰°″\"]")
 _PRESSURE_OVER = re.compile(r"\b([km]?bar|kpa|psi)\s*[(\[]([ga])[)\]]", re.IGNORECASE)  # bar(g): gauge, absolute
 _ROWS = {"skip_rows": 0, "header_rows": 0, "units_rows": 0}  # and the minimum of each
