@@ -165,7 +165,7 @@ def _of_record(given: Record) -> Record:
             raise RecordError(f"record {name}: its {what} are a {type(columns).__name__}: give columns by name.")
     return replace(
         given,
-        condition=_hashable(given.condition, name),
+        condition=given.condition,
         time_s=_seconds(given.time_s, name),
         channels={n: _samples(column, name, n) for n, column in given.channels.items()},
         inputs={n: _own(column, name, n) for n, column in given.inputs.items()},

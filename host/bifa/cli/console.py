@@ -71,13 +71,14 @@ def piped_lines(uno: "Uno") -> Iterator[str]:
 
 
 def _pipe(uno: "Uno", rig: "Rig") -> bool:
-    from bifa.link.terminal import reports_stop, type_line
+    from bifa.link.terminal import raise_if_greeted, reports_stop, type_line
 
     good, before = True, ""
     uno.session.lines.clear()  # drop the greeting: a pipe's reader expects only answers
     for line in piped_lines(uno):
         lines = type_line(uno, line, rig.clock)
         typer.echo("\n".join(lines))
+        raise_if_greeted(lines, line)
         good = good and lines[-1].startswith("ok")
         if reports_stop(lines, line, before):
             typer.echo("error: the robot has stopped by itself; the remaining lines are not carried out", err=True)

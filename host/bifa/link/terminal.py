@@ -28,9 +28,11 @@ def reports_stop(lines: Iterable[str], typed: str = "", before: str = "") -> boo
     return faults > (typed.strip() == "status") or (stopped and not asked)  # `status` shows a fault that is latched
 
 
-def raise_if_greeted(lines: Iterable[str]) -> None:
-    """Raise RestartedError if the Uno greets in `lines` unasked: text needs no session, so no frame may tell of it."""
-    if any(line.startswith("[bifa ") and "started by" in line for line in lines):
+def raise_if_greeted(lines: Iterable[str], typed: str = "") -> None:
+    """Raise RestartedError if the Uno greets in `lines`, answers to `typed` included, unasked: text needs no session,
+    so no frame may tell of it. Not for the lines that arrive with the first session."""
+    asked = typed.split() == ["version"]
+    if not asked and any(line.startswith("[bifa ") and "started by" in line for line in lines):
         raise RestartedError("the Uno restarted; connect again and repeat")
 
 
@@ -73,8 +75,6 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
         else:
             uno.session.poll(0.02)
             uno.session.raise_if_restarted()
-    if word != "version":
-        raise_if_greeted(lines)
     if word in PARAMETER_COMMANDS:
         uno.parameters()  # reads `host_timeout_s`, and with it how often to keep the link alive
     return lines

@@ -129,6 +129,7 @@ class Conversation:
             print("\n".join(lines))
             if is_over:
                 self._drop_waiting()
+        raise_if_greeted(lines, line)
 
     def _start_telemetry(self) -> None:
         self._update_known()

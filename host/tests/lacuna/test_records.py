@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import lacuna
 from lacuna.decimals import decimal
+from lacuna.errors import DeclarationError
 from lacuna.records import RecordError, Table, cell_by_cell, numbers_alone, read, segments, windows
 
 ROWS = "\n".join(f"{k},{k * k}" for k in range(10))
@@ -315,7 +316,7 @@ def test_columns_of_ones_own_record_are_read_like_those_of_a_table():
 
 @pytest.mark.parametrize("condition", [{"bar": 4}, [1, 2], {1}, ("hot", [4])])
 def test_a_condition_by_which_nothing_can_be_grouped_is_refused(condition):
-    with pytest.raises(RecordError, match=r"record a: its condition is a .*: give one label"):
+    with pytest.raises(DeclarationError, match=r"record a: its condition is .*: give text, a number or a tuple"):
         own(condition=condition)
     table = {"time_s": np.arange(10.0), "y": np.arange(10.0), "condition": condition}
     with pytest.raises(RecordError, match="record 1: its condition"):
