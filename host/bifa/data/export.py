@@ -467,12 +467,9 @@ def _form(fields: Fields) -> SheetForm:
     how["separator"] = SEPARATORS.get(str(mark), mark)
     if how["separator"] not in SEPARATORS.values():
         raise fields.error("separator", f"must be one of {', '.join(SEPARATORS)}, or that character")
-    between = how.get(
-        "thousands"
-    )  # numbers in quotes may have the comma that separates cells, as may decimals; a blank, a no-break one
-    if between and (
-        between == how.get("decimal", ".") or (between == how["separator"] and between not in (",", BLANK))
-    ):
+    # Numbers in quotes may have the comma that separates cells, as may decimals; a blank stands for no-break ones.
+    between, apart = how.get("thousands"), {*SEPARATORS.values()} - {",", BLANK}
+    if between and (between == how.get("decimal", ".") or between == how["separator"] in apart):
         raise fields.error("thousands", "must be another character than the decimal sign and the separator")
     if not _is_of_text(how.get("encoding", "utf-8")):
         raise fields.error("encoding", f"{how['encoding']!r} is unknown; utf-8, cp1252, latin-1, utf-16 ...")

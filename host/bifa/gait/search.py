@@ -276,14 +276,13 @@ def optimize(
         if explored.best_value <= 0.0:
             none = f"none of {tried} gaits walks on enough of the drawn robots"
             raise SearchError(f"{none}; narrow their spread, or widen the space")
-    if settings.robust:
         refined = _refine_on_robots(search, explored) if settings.refine else []
         gait, nominal = best_of_finalists(search, explored, [explored, *refined][-1])
     else:
+        refined = []
         if settings.refine:
             explored = _climb_families(search, own, explored)
-            tried = len(explored.values)
-        refined = [_refine(search, own, explored)] if settings.refine else []
+            tried, refined = len(explored.values), [_refine(search, own, explored)]
         gait, nominal = _fastest_finalist(search, explored.joined(*refined))
     verifying, finest = search.verifying_robots(), replace(metric, tolerance_m=FINE_M)
     speeds = distribution(runs, verifying, gait_rows([gait]), finest)[0]

@@ -86,11 +86,10 @@ def _held(port: str) -> Iterator[None]:
         yield
         return
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(handle)
-        raise ToolchainError(PORT_BUSY.format(port=port)) from None
-    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise ToolchainError(PORT_BUSY.format(port=port)) from None
         yield
     finally:
         os.close(handle)

@@ -141,7 +141,7 @@ def climb_together(
     # Each run has coordinates of its own, in which its initial distribution is round.
     own = [np.linalg.solve(shape, start) for shape, start in zip(shapes, tops, strict=True)]
     runs = [_strategy(*start, seed + k, population) for k, start in enumerate(zip(own, steps, strict=True))]
-    bests = [[float(value)] for value in recorder(tops)]  # best value so far of each run, after every generation
+    bests = [[float(value)] for value in recorder(tops)]  # best value so far of each run: its start, generations
     alive, spent = list(range(len(runs))), 0
     while alive and spent < evaluations:
         asked = [runs[k].ask() for k in alive]
