@@ -14,17 +14,24 @@ from lacuna.errors import DeclarationError
 from lacuna.system import START_FACTORS, Effect, Parameter
 
 LIMITS = (0.4, 0.7, 0.9, 1.0, 1.2)  # start factors for the inverse of a declared limit, on both sides of it
+_ROUNDING = 1e-12  # relative, of a logarithm and its exponential
 _MIN_LIMIT_RATIO = 3.0  # times the typical size: an effect that is absent at least this far out is a limit
 
 
 @dataclass(frozen=True)
 class Coordinate:
     """A pair of inverse maps between the user's parameter x and the fitted one u: u = `fitted(x)`, x = `told(u)`.
-    `slope(x)` is |du/dx|, which converts widths. Units stay those of x."""
+    `slope(x)` is |du/dx|, which converts widths. Units stay those of x. bounds: of x."""
 
     fitted: Callable[[float], float]
-    told: Callable[[float], float]
+    inverse: Callable[[float], float]
     slope: Callable[[float], float]
+    bounds: tuple[float, ...] = ()
+
+    def told(self, value: float) -> float:
+        """The user's parameter; a bound, if rounding alone separates it from that: it might lie beyond."""
+        x = self.inverse(value)
+        return next((bound for bound in self.bounds if math.isclose(x, bound, rel_tol=_ROUNDING)), x)
 
     def interval(self, lower: float, upper: float) -> tuple[float, float]:
         """Convert an interval to the user's parameter, the lower end first."""
@@ -46,6 +53,10 @@ class Coordinate:
             grain=p.grain * slope,
             elsewhere=tuple(map(self.fitted, p.elsewhere)),
         )
+
+    def within(self, p: Parameter) -> "Coordinate":
+        """The same coordinate, of `p` alone."""
+        return self if self is PLAIN else replace(self, bounds=(p.lower, p.upper))
 
     def _plausible(self, p: Parameter, told: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
         """Convert a plausible range; an end that becomes infinite (the logarithm of 0) is replaced by the bound. Raises
@@ -113,7 +124,7 @@ def of_effect(effect: Effect) -> tuple[Effect, dict[str, Coordinate]]:
     if len({chosen[p.name] for p in sizing}) > 1:  # sizes share one absent value
         chosen |= {p.name: PLAIN for p in sizing}
     parameters = tuple(chosen[p.name].of(p) for p in effect.parameters)
-    coordinates = {effect.full_name(p): chosen[p.name] for p in effect.parameters}
+    coordinates = {effect.full_name(p): chosen[p.name].within(p) for p in effect.parameters}
     size, factors = chosen[sizing[0].name], effect.start_factors
     if factors == START_FACTORS and size is INVERSE:
         factors = LIMITS

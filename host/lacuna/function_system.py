@@ -131,8 +131,9 @@ class FunctionSystem(System):
         for effect in library:
             _check_known(f"apart of effect {effect.name}", effect.apart, [p.name for p in given], "is no parameter")
         ordered = {p.name for p in free if p.at_least} | {p.at_least for p in free}
-        self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in free}
-        self.parameters = tuple(self._coordinates[p.name].of(p) for p in free)
+        chosen = {p.name: of_parameter(p, p.name in ordered) for p in free}
+        self.parameters = tuple(chosen[p.name].of(p) for p in free)
+        self._coordinates = {p.name: chosen[p.name].within(p) for p in free}
         self.effects: dict[str, Effect] = {}
         # value of every parameter, for those not in `theta`; an effect's are its values while it is off
         self._off: dict[str, float] = {p.name: p.value for p in given}

@@ -423,11 +423,15 @@ def _pack_trials(trials: Sequence[Record], at_once: int) -> list[list[int]]:
 
 
 def _stepped(values: np.ndarray, index: int, parameter: Parameter, step: float) -> tuple[np.ndarray, float]:
-    """Move one entry of `values` by `step`, or by -`step` if that would cross its upper bound."""
-    if values[index] + step > parameter.upper:
-        step = -step
-    moved = values.copy()
-    moved[index] += step
+    """Move one entry of `values` by `step`; if that would cross its upper bound, towards the farther bound, no further
+    than to it."""
+    x, moved = values[index], values.copy()
+    if x + step > parameter.upper:
+        to = max(x - step, parameter.lower) if x - parameter.lower >= parameter.upper - x else parameter.upper
+        step = to - x
+        moved[index] = to
+    else:
+        moved[index] += step
     return moved, step
 
 

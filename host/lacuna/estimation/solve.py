@@ -154,7 +154,8 @@ def _descend(
         step, predicted_gain = _step(*system, here.x, *bounds, scale, damping)
         if predicted_gain < least:
             break
-        there = _State.at(problem, here.point, free, here.x + step)
+        # Clipped again, since x + (bound - x) may round to a value beyond the bound.
+        there = _State.at(problem, here.point, free, np.clip(here.x + step, *bounds))
         ratio = (here.cost - there.cost) / predicted_gain
         if there.cost < here.cost:
             damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))

@@ -6,13 +6,17 @@ import re
 import heater
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import lacuna
 from lacuna import Effect, Parameter
+from lacuna.coordinates import INVERSE, LOG
 from lacuna.errors import DeclarationError, MisuseError
 from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.problem import Problem
+from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.records import Table, segments
 from lacuna.run import with_records
@@ -173,3 +177,34 @@ def test_a_plausible_range_of_a_limit_has_an_end_where_its_inverse_has_one():
     assert limited(1.0).plausible == (0.05, 1.0)
     with pytest.raises(DeclarationError, match=r"limit_W: plausible is 0\.0 to 20\.0, of which its bounds leave no"):
         limited(0.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.01, 10.0), st.floats(0.01, 10.0), st.sampled_from([-1.0, 1.0]), st.booleans())
+def test_a_model_is_never_asked_for_a_value_beyond_a_bound(bound, width, side, positive):
+    """Fits end at the bound, beyond which the truth lies; the last step must not round to a value outside. If the
+    range is `positive`, the logarithm is fitted."""
+    far = bound + width if side < 0.0 else bound / (1.0 + width) if positive else bound - width - bound
+    (lower, upper), truth, asked = sorted((bound, far)), bound + 0.3 * side * bound, []
+    u = np.linspace(-1.0, 1.0, 50)
+
+    def simulate(record, theta):
+        asked.append(theta.gain)
+        return {"y": theta.gain * record["u"]}
+
+    noise = np.random.default_rng(0).standard_normal((3, 50))
+    records = [{"time_s": np.arange(50.0), "u": u, "y": truth * (u + 0.01 * one)} for one in noise]
+    gain = Parameter("gain", "1", 0.5 * (lower + upper), lower, upper)
+    system = with_records(lacuna.System(simulate, [gain], outputs="y"), records)
+    problem = Problem(Structure(system), system.trials, estimate_noise(system, system.trials))
+    solve(problem, problem.start())
+    assert lower <= min(asked)
+    assert max(asked) <= upper
+
+
+@given(st.floats(1e-3, 1e3), st.sampled_from([LOG, INVERSE]))
+def test_a_bound_is_told_as_itself_from_every_coordinate(bound, coordinate):
+    own = coordinate.within(Parameter("rate", "1/s", 1.5 * bound, bound, 2.0 * bound))
+    assert own.told(own.fitted(bound)) == bound
+    assert own.told(own.fitted(2.0 * bound)) == 2.0 * bound
+    assert own.told(own.fitted(1.1 * bound)) == pytest.approx(1.1 * bound)
