@@ -34,7 +34,6 @@ from bifa.gait import Optimum, SearchError, Settings, optimize, simulations
 from bifa.gait.library.scenarios import SCENARIOS
 from bifa.gait.objectives import NominalSpeed, distribution
 from bifa.gait.pool import Simulations
-from bifa.gait.prediction import FINE_M
 from bifa.gait.search import EVALUATIONS
 from bifa.gait.uncertainty import SPREAD
 from bifa.robot import BASE_PARAMETERS, Model, load_model, nominal, strong_push
@@ -131,7 +130,7 @@ def _found(model: Model, settings: Settings, runs: Simulations) -> _Found:
 
 def judged(found: Optimum, model: Model, runs: Simulations) -> float:
     """What the search maximised, on robots that are the same for all searches for `model`."""
-    metric = replace(found.settings.metric, tolerance_m=FINE_M)
+    metric = found.settings.metric.with_tolerance(found.settings.fine_m)
     speeds = distribution(runs, found.spread.plants(model, _COMMON, _COMMON_SEED), gait_rows([found.gait]), metric)[0]
     return found.settings.low_mm_s(speeds, found.settings.share)
 

@@ -25,6 +25,7 @@ _SETTLED = 1e-3
 # A search reads no pressures, and when a small actuator snaps hardly moves the advance: at ten times the tolerance for
 # their states a walk takes two thirds of the steps, and the same robots fall.
 _LOOSER = 10.0
+_SINGLE_M = 1e-6  # at smaller tolerances single precision rounds more than the integrator errs
 _EXACT = Scatter()  # valves that switch when the gait says
 
 
@@ -74,6 +75,10 @@ class Metric:
     def is_plain(self) -> bool:
         """Whether the metric is for walking forward through a level pipe."""
         return self.direction == 1 and self.inclination_deg == 0.0
+
+    def with_tolerance(self, tolerance_m: float) -> "Metric":
+        """Return the metric with another tolerance, in double precision if that is below a micrometre."""
+        return replace(self, tolerance_m=tolerance_m, single=tolerance_m >= _SINGLE_M)
 
     def finer(self) -> "Metric":
         """Return the metric for finalists: twenty cycles, all simulated and the last ten judged, and a far smaller
@@ -128,6 +133,10 @@ class Passage:
     def terrain(self) -> np.ndarray:
         """The tunnel, 10 cm ahead of the head."""
         return terrain(tunnel())
+
+    def with_tolerance(self, tolerance_m: float) -> "Passage":
+        """Return the metric with another tolerance, in double precision if that is below a micrometre."""
+        return replace(self, tolerance_m=tolerance_m, single=tolerance_m >= _SINGLE_M)
 
     def finer(self) -> "Passage":
         """Return the metric for finalists: a smaller step, in double precision."""

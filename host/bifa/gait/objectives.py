@@ -3,7 +3,6 @@ gaits with which nearly every robot walks."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -43,8 +42,9 @@ class RobustSpeed:
     jitter: every draw walks all gaits slower or faster by a fixed fraction of its own within it. At the cliff the set
     of periods with which a robot walks is ragged, and a climb ends on the first spike; over draws that differ in period
     narrower spikes average out. typical: number of draws, besides the model itself, by whose mean speed those that
-    walk are counted (see `as_walked`); 0: every draw counts with its own speed. The model and typical draws take fine
-    steps: next to a cliff there often are two ways of walking, 3 % apart, and coarse steps may find the wrong one.
+    walk are counted (see `as_walked`); 0: every draw counts with its own speed. fine_m: integrator's tolerance for the
+    model and typical draws: next to a cliff there often are two ways of walking, 3 % apart, and coarse steps may find
+    the wrong one.
     """
 
     def __init__(
@@ -58,10 +58,11 @@ class RobustSpeed:
         abandon: float = 0.9,
         jitter: float = 0.0,
         typical: int = 0,
+        fine_m: float = FINE_M,
     ):
         self._runs, self._space, self._draws = runs, space, draws
         self._metric = metric.of_draws()
-        self._nominal, self._typical, self._fine = nominal, draws[:typical], replace(metric, tolerance_m=FINE_M)
+        self._nominal, self._typical, self._fine = nominal, draws[:typical], metric.with_tolerance(fine_m)
         self._rank = max(1, math.ceil(share * len(draws)))
         self._failures = np.zeros(len(draws))
         self._abandon, self._best = abandon, 0.0

@@ -13,7 +13,11 @@ from bifa.robot.model import Model
 from bifa.simulate import gait_rows, plant, speeds
 
 DRAWS = 256
-FINE_M = 1e-6  # integration step for gaits near the edge
+FINE_M = 1e-6  # integrator's tolerance for gaits near the edge
+# Between two ways of walking, 3 % apart, 17 % of the robots took the slower one at a tolerance of 1 um, 54 % at 0.1 um,
+# 68 % at 0.01 um, and so did the robot itself. Robots that are tried with both tolerances, and the relative difference
+# of their speeds from which all are walked with the smaller one:
+_EXACT_M, _TRIED, _DIFFERS = 1e-8, 16, 2e-3
 CYCLES = 16
 MIN_SPEED_RATIO = 0.8  # of the median of the robots that walk: slower ones do not walk as predicted
 _FASTEST = 0.98  # quantile that counts as the fastest robots: at a cliff most may fall, and a few tell nothing
@@ -103,13 +107,7 @@ class Predictor:
         clock_rate: seconds per second of the Uno, default as known; speeds are on the Uno's clock.
         """
         draws, rate = len(self._robots) - 1, self._timing.clock if clock_rate is None else clock_rate
-        rows = np.repeat(gait_rows([gait]), len(self._robots), axis=0)
-        rows[:, 0] *= rate
-        vented_s, tick_s = rate * self._timing.dead_time_s, rate * self._timing.tick_s
-        progress = speeds(
-            self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, tick_s=tick_s, single=True, workers=workers
-        )
-        advance_mm = 1e3 * progress.advance_m
+        advance_mm = self._advance_mm(gait, cycles, rate, workers)
         found = [settling(one) for one in advance_mm]
         begins = [f.begins for f in found[:draws] if f.is_settled]
         settled = int(np.ceil(np.quantile(begins, 0.95))) if begins else CYCLES  # of nineteen of twenty robots
@@ -124,6 +122,32 @@ class Predictor:
         errors = (-seen_mm_s if backward else seen_mm_s) - drawn
         errors += drawn * self._noise_share * random.standard_normal(draws)
         return Prediction(drawn, settled + MIN_CYCLES, backward, errors, own_mm_s)
+
+    def _advance_mm(self, gait: Gait, cycles: int, rate: float, workers: int | None) -> np.ndarray:
+        """Advance (robots, cycles) of every robot, integrated as finely as the gait needs."""
+        rows = np.repeat(gait_rows([gait]), len(self._robots), axis=0)
+        rows[:, 0] *= rate
+        vented_s, tick_s = rate * self._timing.dead_time_s, rate * self._timing.tick_s
+
+        def walked_mm(robots: slice, tolerance_m: float, single: bool) -> np.ndarray:
+            progress = speeds(
+                self._robots[robots],
+                rows[robots],
+                cycles,
+                tolerance_m,
+                dead_time_s=vented_s,
+                tick_s=tick_s,
+                single=single,
+                workers=workers,
+            )
+            return 1e3 * progress.advance_m
+
+        tried, others = slice(-_TRIED, None), slice(-_TRIED)
+        found_mm, exact_mm = walked_mm(slice(None), FINE_M, True), walked_mm(tried, _EXACT_M, False)
+        way_mm = exact_mm.sum(axis=1)
+        if np.abs(found_mm[tried].sum(axis=1) - way_mm).max() <= _DIFFERS * np.abs(way_mm).max():
+            return found_mm
+        return np.vstack([walked_mm(others, _EXACT_M, False), exact_mm])
 
 
 def predict_speed(

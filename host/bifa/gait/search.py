@@ -100,6 +100,7 @@ _FAMILY_CLIMBS = 1000  # evaluations of these on the model itself
 # Shares of the best value that a gait must keep in the check: to be accepted at once, and to count as walking.
 _ACCEPT_RATIO, _WALK_RATIO = 0.993, 0.5
 _NO_FINALIST = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
+_EDGE_M = 1e-7  # integrator's tolerance at the edge, where ways of walking part that a parameter's error moves less
 _EDGE_QUANTILE = 0.05  # share of the robots that need not walk with a gait at the edge
 # Refinement on the model itself: a large population, since along a ragged ridge a small one ends at the first spike.
 _FINAL_STEP, _FINAL, _FINAL_POPULATION = 0.03, 2400, 48
@@ -149,6 +150,11 @@ class Settings:
     def rules(self) -> Metric | Passage:
         """The metric that applies: a robust search judges the model itself by the rules for drawn robots."""
         return self.metric.of_draws() if self.robust else self.metric
+
+    @property
+    def fine_m(self) -> float:
+        """Tolerance of the integrator, per step, when gaits are compared with one another and verified."""
+        return _EDGE_M if self.at_edge else FINE_M
 
     def low_mm_s(self, speeds_mm_s: np.ndarray, share: float) -> float:
         """Return the quantile `share` of drawn robots' speeds (n,) as this search counts them."""
@@ -213,10 +219,10 @@ class SearchRun:
         """Return the objective of a round, on robots of its own."""
         settings = self.settings
         draws = self.robots(stage.draws, settings.seed + 500_000 * number)
-        metric = replace(settings.metric, tolerance_m=stage.tolerance_m)
+        metric = settings.metric.with_tolerance(stage.tolerance_m)
         share = stage.quantile * settings.share / QUANTILE
         nominal, space = plant(self.model), settings.space
-        rules = (share, stage.abandon, stage.jitter, stage.typical if settings.at_edge else 0)
+        rules = (share, stage.abandon, stage.jitter, stage.typical if settings.at_edge else 0, settings.fine_m)
         return RobustSpeed(self.runs, nominal, draws, space, metric, *rules)
 
     def robots(self, count: int, seed: int) -> list[Plant]:
@@ -284,7 +290,7 @@ def optimize(
             explored = _climb_families(search, own, explored)
             tried, refined = len(explored.values), [_refine(search, own, explored)]
         gait, nominal = _fastest_finalist(search, explored.joined(*refined))
-    verifying, finest = search.verifying_robots(), replace(metric, tolerance_m=FINE_M)
+    verifying, finest = search.verifying_robots(), metric.with_tolerance(settings.fine_m)
     speeds = distribution(runs, verifying, gait_rows([gait]), finest)[0]
     search.on_progress("verify", 1.0, nominal)
     return Optimum(
@@ -469,7 +475,7 @@ def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated
     best, promised = recorder.found().finalists(_ROBUST_FINALISTS, apart=_MIN_SPACING), recorder.best
     search.on_progress("verify", 0.6, promised)
     checking = search.robots(_CHECKING_DRAWS, settings.seed + 2_500_000)
-    metric = replace(settings.metric, tolerance_m=FINE_M)
+    metric = settings.metric.with_tolerance(settings.fine_m)
     # Relative to the best value of the last round, not to the gait's speed on the model, where it may have failed too.
     least = max(_WALK_RATIO * promised, STANDING_MM_S)
     near = np.concatenate([best, *(space.slower(best[:1], share) for share in _SLOWER)])
