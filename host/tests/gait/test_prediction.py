@@ -7,11 +7,13 @@ import pytest
 
 from bifa.gait import Metric, library
 from bifa.gait.prediction import Prediction, predict_speed
-from bifa.gait.settling import measured_speed, settling
+from bifa.gait.settling import measured_speed
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import BASELINE, Covariance, Gait, nominal
 from bifa.robot.model import Scatter
 from bifa.simulate import gait_rows, layout, of_gait, speeds, vented_between, walk
+
+TWO_WAYS = Gait(2.66, 215.0, 88.0, 0.661, 0.69, 0.69)
 
 
 def known(scatter=None, sd=1e-6, **changes):
@@ -140,21 +142,24 @@ def test_at_a_cliff_the_ticks_of_the_uno_decide():
     assert baseline[1] == pytest.approx(baseline[0], abs=0.01), "elsewhere they do not"
 
 
-@pytest.mark.parametrize("draws", [8, 32])
-def test_between_two_ways_of_walking_a_prediction_is_integrated_exactly(draws):
-    gait, known = Gait(2.66, 215.0, 88.0, 0.661, 0.69, 0.69), spread_of(nominal(), 1e-3)
-    robots = known.plants(nominal(), draws, 4_000_037)
-    rows = np.repeat(gait_rows([gait]), draws, axis=0)
+@pytest.mark.parametrize(
+    ("gait", "draws", "expected"),
+    [
+        pytest.param(BASELINE, 32, [(33, 1e-6), (16, 1e-8)], id="all walk alike at both tolerances"),
+        pytest.param(TWO_WAYS, 32, [(33, 1e-6), (16, 1e-8), (17, 1e-8)], id="two ways of walking"),
+        pytest.param(TWO_WAYS, 8, [(9, 1e-6), (9, 1e-8), (0, 1e-8)], id="fewer robots than are tried"),
+    ],
+)
+def test_where_the_integrators_error_decides_all_robots_take_finer_steps(monkeypatch, gait, draws, expected):
+    seen = []
 
-    def walked_mm_s(tolerance_m):
-        uno = known.scatter.timing
-        advance_m = speeds(robots, rows, 12, tolerance_m, dead_time_s=uno.dead_time_s, tick_s=uno.tick_s).advance_m
-        return 1e3 * np.array([one[settling(one).begins :].mean() for one in advance_m]) / gait.period_s
+    def spied(robots, rows, cycles, tolerance_m, **how):
+        seen.append((len(robots), tolerance_m))
+        return speeds(robots, rows, cycles, tolerance_m, **how)
 
-    found = predict_speed(nominal(), known, gait, draws=draws, cycles=12).speeds_mm_s
-    exact, coarse = walked_mm_s(1e-8), walked_mm_s(1e-6)
-    np.testing.assert_allclose(found, exact, rtol=5e-3)
-    assert np.abs(coarse / exact - 1.0).max() > 0.01, "the gait tells coarse steps from fine ones"
+    monkeypatch.setattr("bifa.gait.prediction.speeds", spied)
+    assert len(predict_speed(nominal(), spread_of(nominal(), 1e-3), gait, draws=draws).speeds_mm_s) == draws
+    assert seen == expected
 
 
 def test_how_the_uno_keeps_time_is_known_whatever_the_spread():
