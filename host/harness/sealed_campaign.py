@@ -48,7 +48,7 @@ def generate(
     session. Raises VirtualRobotError or BifaError.
     """
     forced: dict[str, dict[str, float]] = {}
-    check_request(out, effect, size)
+    check_request(out, effect, size, seed)
     if effect is not None:
         random = np.random.default_rng([seed, 0xEF])
         factor = float(random.uniform(*SIZES)) if size is None else size

@@ -11,6 +11,19 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from virtual_robot.errors import VirtualRobotError
+
+
+def seal_of(out: Path, asked: Path | None) -> Path:
+    """The file for the truth of the data set `out`: `asked`, or OUT.sealed.toml beside it. Raises VirtualRobotError if
+    it exists, or cannot be written."""
+    seal = asked or out.with_name(out.name + ".sealed.toml")
+    if seal.exists():
+        raise VirtualRobotError(f"{seal} exists already, the truth of another data set; move it away first")
+    if asked and not seal.parent.is_dir():
+        raise VirtualRobotError(f"the folder {seal.parent} does not exist; create it first")
+    return seal
+
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:

@@ -5,6 +5,7 @@ Parameter `p` of an effect is the plant's parameter `<effect>_p`. `sizes` are wh
 has a multiple of them. `drawn` are the remaining parameters, with the range that each is drawn from.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -83,5 +84,9 @@ def plant_parameters(effects: Mapping[str, Mapping[str, float]]) -> dict[str, fl
         if unknown:
             allowed = ", ".join([*effect.sizes, *effect.drawn])
             raise PlantParameterError(f"{name} has no parameter {', '.join(sorted(unknown))}; it has {allowed}")
+        for key, value in given.items():
+            if not math.isfinite(value) or (value < 0.0 and not effect.signed):
+                wanted = "a finite number" if effect.signed else "a finite number, not negative"
+                raise PlantParameterError(f"{name}.{key} = {value:g} must be {wanted}")
         numbers |= {f"{name}_{key}": float(value) for key, value in (effect.defaults() | dict(given)).items()}
     return numbers

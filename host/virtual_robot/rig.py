@@ -23,7 +23,7 @@ from virtual_robot.instruments import Instruments, Noise
 from virtual_robot.plant import Plant
 from virtual_robot.plant import profile as parameters_in
 from virtual_robot.pty_server import serve
-from virtual_robot.sealed import draw_effects, specimen
+from virtual_robot.sealed import KINDS, draw_effects, specimen
 from virtual_robot.uno import CLOCK_HZ, Uno
 
 CLONE = Path(__file__).resolve().parents[2]  # if installed with `pip install -e`
@@ -201,6 +201,10 @@ def open_rig(
     `eeprom`: a file that keeps the EEPROM's contents. `parameters`: plant parameters to replace.
     Raises VirtualRobotError, saying what to do.
     """
+    if seed < 0 or (sealed or 0) < 0:
+        raise VirtualRobotError(f"seed = {seed} and sealed = {sealed} must not be negative")
+    if sealed_kind not in KINDS:
+        raise VirtualRobotError(f"sealed_kind {sealed_kind!r} is not one of {', '.join(KINDS)}")
     numbers, curves, inside = parameters_in(profile), None, dict(effects or {})
     bench = _BENCHES[profile]
     if sealed is not None:

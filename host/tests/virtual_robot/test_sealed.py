@@ -12,9 +12,10 @@ from bifa.data import read_dataset
 from bifa.measure.plan import PlannedTrial
 from harness import sealed_campaign
 from virtual_robot import sealed
-from virtual_robot.effects import LIBRARY, OUTSIDE
+from virtual_robot.effects import LIBRARY, OUTSIDE, plant_parameters
 from virtual_robot.instruments.sensors import Noise, measured
 from virtual_robot.plant import NOMINAL, profile
+from virtual_robot.plant.parameters import PlantParameterError
 from virtual_robot.sealed import SealedError, draw_effects, generate, main
 from virtual_robot.truths.foreign.day import Day
 
@@ -121,3 +122,29 @@ def test_realistic_noise_is_colored_and_ideal_noise_is_white():
         seen = measured(np.zeros(40000), noise.camera_m, np.random.default_rng(1), noise.correlation(0.01))
         assert seen.std() == pytest.approx(noise.camera_m, rel=0.03)
         assert np.corrcoef(seen[1:], seen[:-1])[0, 1] == pytest.approx(expected, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["--seed", "-1"], "seed = -1 must not be negative"),
+        (["--seed", "1", "--effect", "leak", "--size", "-1"], "size = -1 must be above 0"),
+        (["--seed", "1", "--effect", "leak", "--size", "nan"], "size = nan must be above 0"),
+        (["--seed", "1", "--effect", "leak", "--pair"], "leave one of the two out"),
+        (["--seed", "1", "--label", "missing/truth.toml"], "does not exist"),
+        (["--seed", "1", "--label", "kept.toml"], "the truth of another data set"),
+    ],
+)
+@pytest.mark.parametrize("truth", ["own", "foreign"])
+def test_a_request_that_would_give_a_false_truth_is_refused(tmp_path, monkeypatch, capsys, truth, given, told):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "kept.toml").write_text("kept = true")
+    assert main(["--truth", truth, "--out", "day", *given]) == 2
+    assert told in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["kept.toml"]
+
+
+def test_an_effect_of_a_size_that_it_cannot_have_is_refused():
+    with pytest.raises(PlantParameterError, match=r"hysteresis\.force_N = -4 must be a finite number, not negative"):
+        plant_parameters({"hysteresis": {"force_N": -4.0}})
+    assert plant_parameters({"inclination": {"angle_deg": -5.0}})["inclination_angle_deg"] == -5.0

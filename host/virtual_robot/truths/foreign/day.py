@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from virtual_robot.data_folder import new_folder, write_csv, write_head
+from virtual_robot.data_folder import new_folder, seal_of, write_csv, write_head
 from virtual_robot.errors import VirtualRobotError
 from virtual_robot.gait import BASELINE, EASY, LEISURELY
 from virtual_robot.truths.foreign.bench import Bench, Instruments, Plan
@@ -228,10 +228,11 @@ def generate(
     out = Path(out)
     if out.exists():
         raise DayError(f"{out} exists already; data sets are never overwritten")
+    seal = seal_of(out, seal)
     day = Day.draw(seed, kind, effect, size, form)
     with new_folder(out) as folder:
         for job, columns in day.run().items():
             write_csv(folder / day.entry(job)["file"], columns)
         write_head(folder, f"bench-{seed}", day.known(), [day.entry(job) for job in range(len(day.jobs))])
-        (seal or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(day.label.as_dict()))
+        seal.write_text(tomli_w.dumps(day.label.as_dict()))
     return day.label
