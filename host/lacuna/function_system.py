@@ -203,8 +203,9 @@ class FunctionSystem(System):
         return self._with(_test=tuple(names))
 
     def with_noise_time(self, seconds: Mapping[str, float]) -> FunctionSystem:
-        """A copy of the system with a declared correlation time of the noise, in seconds, by output."""
-        return self._with(_noise_time_s=dict(seconds), estimates_noise_time=False)
+        """A copy of the system with a declared correlation time of the noise, in seconds, for these outputs."""
+        declared = self._noise_time_s if isinstance(self._noise_time_s, Mapping) else {}
+        return self._with(_noise_time_s={**declared, **seconds}, estimates_noise_time=False)
 
     def with_grains(self, grains: Mapping[str, float]) -> FunctionSystem:
         """A copy of the system with `grains`, by full name and in fitted coordinates, as the `Parameter.grain` of
@@ -305,8 +306,11 @@ class FunctionSystem(System):
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         given = self._nuisances
+        simulated = trial.payload.run if isinstance(trial.payload, Stretch) else trial
         found = (
-            _call_for_trial("nuisances", trial, lambda: several(given(trial), Parameter)) if callable(given) else given
+            _call_for_trial("nuisances", trial, lambda: several(given(simulated), Parameter))
+            if callable(given)
+            else given
         )
         for p in found:
             if p.name in self._off or p.name in self._sites:

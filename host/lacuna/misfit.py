@@ -38,7 +38,7 @@ def compare_at_misfit(
     for _ in range(_ROUNDS):
         level = {key: _FRACTION * rms for key, rms in left.items() if rms > SOFT_LIMIT * was[key]}
         level = {key: sd for key, sd in level.items() if sd > _MIN_RAISE_RATIO * was[key]}
-        if not level or found.verdict == "none":
+        if not level or found.verdict == "none" or found.is_stopped:
             break
         next_found = again(system.with_floor(level))
         next_left = residual_rms(next_found)

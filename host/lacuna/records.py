@@ -523,7 +523,8 @@ def windows(
     starts = np.arange(skip, time[-1] - seconds + 1.5 * sample, every)
     if len(starts) < 3:
         raise RecordError(f"record {table.name} lasts {time[-1]:.4g} s, too short for three windows of {seconds:g} s.")
-    even, size = bool((np.abs(steps - sample) < 0.5 * sample).all()), round(seconds / sample)
+    size = round(seconds / sample)
+    even = bool((np.abs(steps - sample) < 0.5 * sample).all() and abs(steps.mean() - sample) * size < 0.5 * sample)
     digits = 3 - math.floor(math.log10(sample))  # a thousandth of a sample: smaller differences of phase are rounding
     found = []
     for place, start in enumerate(starts):
@@ -534,7 +535,8 @@ def windows(
         phase = round(start % period, digits) if period else place
         phase = 0.0 if period and period - phase < 0.5 * sample else phase
         name = _part(table, f"window {place + 1}")
-        window = _cut(table, at, name, {"condition": f"from {phase:.15g} s" if period else name, "order": place})
+        own = f"{table.labels['condition']}, " if "condition" in table.labels else ""
+        window = _cut(table, at, name, {"condition": f"{own}from {phase:.15g} s" if period else name, "order": place})
         found.append(replace(window, time_s=time[at] - time[at][0]))
     if len(found) < 3:
         raise RecordError(

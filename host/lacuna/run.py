@@ -96,7 +96,8 @@ def diagnose(
             found = answer(system)
             raised: Mapping[tuple[str, str], float] = {}
             if isinstance(system, FunctionSystem):
-                if system.estimates_noise_time and any((left_s := residual_correlation_s(found)).values()):
+                estimates = system.estimates_noise_time and not found.is_stopped
+                if estimates and any((left_s := residual_correlation_s(found)).values()):
                     system = system.with_noise_time(left_s)
                     found = answer(system)
                 found, raised = compare_at_misfit(system, found, answer)
@@ -196,7 +197,9 @@ def _with_residual_warnings(
         for channel, seconds in left_s.items()
         if seconds > 0.0 and not any(system.noise_time_s(*key) for key in levels if key[1] == channel)
     }
-    if advised and isinstance(system, FunctionSystem) and found.effects:
+    if found.is_stopped:
+        advised = {}
+    elif advised and isinstance(system, FunctionSystem) and found.effects:
         named, still = ({e.name for e in one.effects} for one in (found, answer(system.with_noise_time(advised))))
         advised = advised if named <= still else {}
     said = [

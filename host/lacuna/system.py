@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from numbers import Integral, Real
 from typing import Any, Protocol
 
@@ -99,7 +99,12 @@ class Parameter:
         """`scale`; if none is given, a tenth of |value|, or of the range if the value is 0."""
         if self.scale is not None:
             return self.scale
-        return 0.1 * (abs(self.value) or min(self.upper - self.lower, 1e6))
+        return 0.1 * (abs(self.value) or self.upper - self.lower)
+
+
+def _one_scale_away(p: Parameter) -> Parameter:
+    away = p.value + p.step_scale
+    return replace(p, value=away if away <= p.upper else max(p.value - p.step_scale, p.lower), scale=p.step_scale)
 
 
 def _is_range(given: Any) -> bool:
@@ -142,7 +147,7 @@ class Effect:
 
     The first `sizes` of `parameters` set the size of the effect: it vanishes when all of them equal `absent` (0 by
     default); the others only shape it. Parameters have local names (`force_N`) and appear in `theta` as
-    `hysteresis.force_N`. A parameter's `value` is a typical magnitude. Fits start at the typical sizes times each of
+    `hysteresis.force_N`. A parameter's `value` is a typical magnitude; if it is `absent`, one `scale` from there. Fits start at the typical sizes times each of
     `start_factors` (and with the opposite sign, if the bounds allow it).
 
     `enters` names the term of the model that changes ("body spring", "pressure sensor"). `experiments` lists those in
@@ -185,6 +190,9 @@ class Effect:
             raise DeclarationError(f"effect {self.name}: `absent` is {self.absent!r}, not a number")
         if not 1 <= self.sizes <= len(self.parameters):
             raise DeclarationError(f"effect {self.name}: `sizes` is {self.sizes} for {len(self.parameters)} parameters")
+        sizing, shaping = self.parameters[: self.sizes], self.parameters[self.sizes :]
+        if all(p.value == self.absent for p in sizing):  # a fit that begins there sees no effect
+            object.__setattr__(self, "parameters", (*map(_one_scale_away, sizing), *shaping))
         names = [p.name for p in self.parameters]
         if self.frequency is not None and self.frequency not in names:
             raise DeclarationError(

@@ -34,7 +34,8 @@ def _width(
     for trial in trials:
 
         def predict(value: float, trial: Record = trial) -> Channels:
-            return predict_unchecked(system, {**theta, name: value}, effects, trial)
+            found = predict_unchecked(system, {**theta, name: value}, effects, trial)
+            return {channel: found[channel] for channel in trial.channels}
 
         # An initial value that is a whole number of samples may lie right before an edge.
         first, second, third = (predict(parameter.value + k * small) for k in range(3))

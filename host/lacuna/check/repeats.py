@@ -37,14 +37,14 @@ def check_inputs(system: System, trials: Sequence[Record], predictions: Mapping[
     ignored: dict[str, str] = {}
     for first, other, name, its, said in _differences([t for t in trials if t.name in predictions]):
         there = replace(first, inputs={**first.inputs, name: its})
-        of_column = np.ndim(its) > 0
-        found, share = predicted(system, initial(system), (), there), SAME if of_column else _MAX_INPUT_DIFFERENCE
-        if channel := changed(found, predictions[first.name], first, share):
+        found, own = predicted(system, initial(system), (), there), predictions[first.name]
+        is_used = changed(found, own, first, SAME)
+        if channel := is_used if np.ndim(its) else changed(found, own, first, _MAX_INPUT_DIFFERENCE):
             raise MisuseError(
                 f"{_declared(first, other)}, but {said}, which changes the prediction of {channel}: the difference"
                 " would be taken for noise. Give them different conditions."
             )
-        if of_column:
+        if not is_used:
             ignored.setdefault(name, f"{first.name} and {other.name}")
     for name, pair in ignored.items():
         yield (
@@ -75,7 +75,8 @@ def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
             if _same_columns(first.channels, other.channels):
                 yield f"Trials {first.name} and {other.name} are identical: a copy is not a repeat. Leave one out."
     for experiment, channel in by_channel(trials):
-        members = [group for group in groups if group[0].experiment == experiment]
+        having = ([t for t in group if channel in t.channels] for group in groups if group[0].experiment == experiment)
+        members = [group for group in having if len(group) > 1]
         apart = [_apart(group, channel) for group in members]
         for k, (group, differences) in enumerate(zip(members, apart, strict=True)):
             elsewhere = [value for j, d in enumerate(apart) if j != k for value in _pairs(d)]
@@ -86,10 +87,11 @@ def unexplained_differences(system: System, trials: Sequence[Record]) -> Iterato
     """Warn of the worst group of repeats that differ by much of their range and far more than their own noise although
     nothing is declared to vary from run to run. A setting that only their names tell may be the cause."""
     found = []
-    for group in groups_of_repeats(trials):
-        if len(group) < 2 or any(system.nuisances(trial) for trial in group):
-            continue
-        for channel in group[0].channels:
+    for every in groups_of_repeats(trials):
+        for channel in dict.fromkeys(channel for trial in every for channel in trial.channels):
+            group = [trial for trial in every if channel in trial.channels]
+            if len(group) < 2 or any(system.nuisances(trial) for trial in group):
+                continue
             between = float(np.median(_pairs(_apart(group, channel))))
             within = float(np.median([fast_noise(trial.time_s, trial.channels[channel]) for trial in group]))
             size = max(spread(trial.channels[channel]) for trial in group)

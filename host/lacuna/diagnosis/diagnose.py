@@ -74,6 +74,11 @@ class Diagnosis:
     drifts: tuple[Drift, ...]
     seconds: float
 
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the search was stopped by hand: nothing further is then tried."""
+        return STOPPED in self.warnings
+
     def __repr__(self) -> str:
         named = "".join(f", {e.name}" for e in self.effects)
         return f"<{self.verdict}{named}: error {self.before.held_out:.3g} to {self.after.held_out:.3g} floors>"
@@ -270,9 +275,11 @@ def _unsupported(case: Case, found: Search, tried: Sequence[Nearest]) -> list[st
     near = next((found.with_effects(one.effects) for one in tried if one.share_of_gap > case.policy.half), None)
     if near is None:
         return []
-    against = Comparison(found, case.policy, case.exceeds)
-    base, other = (case.cross_validated.get(one, one) for one in (found.base, against.form(near)))
-    why = against.why_not_worse(base, other)
+    base, other, validated = found.base, Comparison(found, case.policy, case.exceeds).form(near), case.cross_validated
+    if base in validated and other in validated:
+        base, other = validated[base], validated[other]
+        found = replace(found, base=base, tried=tuple(validated[one] for one in found.tried if one in validated))
+    why = Comparison(found, case.policy, case.exceeds).why_not_worse(base, other)
     return [f"{' and '.join(near.effects)} is not supported: {why}."] if why else []
 
 

@@ -110,7 +110,7 @@ def find_remainder(
         shared[key] = float(np.average(sizes, weights=[len(part) for part in (repeated, single) if part]))
         z[key], alone[key] = max(zs), min(1.0, len(tests) * min(chances))
     chance = {key: float(-np.expm1(len(z) * np.log1p(-min(p, 0.999)))) for key, p in alone.items()}
-    good_enough = {key: (system.accuracy(*key) / floor.channels[key].sd) ** 2 for key in shared}
+    good_enough = {key: float(_compressed(system.accuracy(*key) / floor.channels[key].sd)) ** 2 for key in shared}
     return Remainder(shared, z, chance, good_enough, policy, spread)
 
 
@@ -147,9 +147,13 @@ def _by_condition(trials: Sequence[Record], scaled: Sequence[Channels]) -> dict[
                 measured, residual = np.isfinite(trial.channels[channel]), z[trial.name][channel]
                 # what the model could not predict is penalized, and what is large compressed, as in a fit
                 penalized = np.where(measured & ~np.isfinite(residual), FAILED, residual)
-                rows.append(SOFT_LIMIT * np.arcsinh(at_times(having[0].time_s, trial.time_s, penalized) / SOFT_LIMIT))
+                rows.append(_compressed(at_times(having[0].time_s, trial.time_s, penalized)))
             found[having[0].experiment, channel].append(np.array(rows))
     return found
+
+
+def _compressed(z: np.ndarray | float) -> np.ndarray:
+    return SOFT_LIMIT * np.arcsinh(np.divide(z, SOFT_LIMIT))
 
 
 def _in_common(rows: np.ndarray) -> float:

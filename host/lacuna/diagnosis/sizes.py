@@ -61,6 +61,8 @@ def peaks(
     """The `count` most prominent frequencies [Hz] of the residuals `scaled`, by power over background, all pooled."""
     from scipy.signal import find_peaks  # slow to import
 
+    fastest_s = min(sample_period(trial.time_s) for trial in trials)
+    upper_hz = min(upper_hz, max(0.5 / fastest_s, 2.0 * lower_hz))  # above that nothing shows
     resolution_hz = _resolution_hz(max(trial.time_s[-1] - trial.time_s[0] for trial in trials), upper_hz - lower_hz)
     frequencies = np.arange(lower_hz, upper_hz, resolution_hz)
     pooled, weight = np.zeros(len(frequencies)), np.zeros(len(frequencies))

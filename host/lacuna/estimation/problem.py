@@ -135,7 +135,10 @@ class Problem:
         for k in range(-1, -len(self._own[index]) - 1, -1):
             parameter = self.nuisances[index][k]
             tried = np.tile(nuisances[index], (_OWN_STARTS, 1))
-            tried[:, k] = np.linspace(parameter.lower, parameter.upper, _OWN_STARTS, endpoint=False)
+            away = 2.0 * parameter.step_scale  # without bounds
+            low, high = max(parameter.lower, parameter.value - away), min(parameter.upper, parameter.value + away)
+            ends = (parameter.lower, parameter.upper) if np.isfinite(parameter.upper - parameter.lower) else (low, high)
+            tried[:, k] = np.linspace(*ends, _OWN_STARTS, endpoint=False)
             found = self._simulate([(values, mine) for mine in tried], index, coarse=True)
             costs = np.sum(self._weigh(found, index) ** 2, axis=1)
             nuisances[index] = tried[int(np.argmin(costs))]

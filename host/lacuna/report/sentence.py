@@ -45,7 +45,7 @@ def verdict_sentence(
 ) -> str:
     """State a verdict in one sentence. `words` names an effect; `nearest`: other explanations tried."""
     if verdict == "none":
-        near = "to within the noise" if (remainder["times_floor"] or 0.0) <= 1.0 else "as well as was asked for"
+        near = "to within the noise" if (remainder["times_floor"] or 0.0) <= 1.0 else "closely enough not to matter"
         return f"Nothing that matters is missing from the base model: it predicts these data {near}."
     if verdict == "unexplained":
         near_one = next((one for one in nearest if (one["share_of_gap"] or 0.0) > 0.5), None)

@@ -161,7 +161,7 @@ def _found(verdict, left, floor):
     trial = SimpleNamespace(name="a", experiment="run")
     final = SimpleNamespace(residuals=lambda: {"a": {"y": np.full(9, left)}}, problem=SimpleNamespace(trials=(trial,)))
     floors = SimpleNamespace(channels={("run", "y"): SimpleNamespace(sd=floor)})
-    return SimpleNamespace(verdict=verdict, final=final, search=SimpleNamespace(floor=floors))
+    return SimpleNamespace(verdict=verdict, final=final, search=SimpleNamespace(floor=floors), is_stopped=False)
 
 
 def test_explanations_far_above_the_floor_are_compared_at_a_fraction_of_what_they_leave():
