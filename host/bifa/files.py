@@ -80,6 +80,8 @@ def _refuse_same(files: list[Path], folders: list[Path]) -> None:
     for path in folders:
         if path.resolve() in taken:
             raise TargetError(f"{path} is used for both a file and a folder; choose different paths")
+        if pictures := [file for file in taken if file.parent == path.resolve() and file.suffix.lower() == ".png"]:
+            raise TargetError(f"{pictures[0]} may be a picture's name in {path}; choose another name or folder")
 
 
 def _refuse_irregular(path: Path) -> None:

@@ -180,3 +180,9 @@ def test_what_a_link_leads_to_is_written_and_the_link_stays(tmp_path):
     write_text(link, "new\n")
     assert (link.is_symlink(), shared.read_text()) == (True, "new\n")
     assert list(shared.parent.iterdir()) == [shared]
+
+
+def test_a_file_is_not_given_a_name_that_a_picture_may_have(tmp_path):
+    with pytest.raises(TargetError, match="may be a picture's name"):
+        check_targets(tmp_path / "walk.png", folders=(tmp_path,))
+    check_targets(tmp_path / "walk.csv", folders=(tmp_path,))

@@ -80,7 +80,7 @@ NOTED = {
     "command_age_s": (-0.1, 0.1),
     "gait_ahead_s": (0.0, 0.1),
     "tick_s": (0.0, 0.1),
-    "averaged_s": (0.0, 0.01),  # less than from one sample to the next
+    "averaged_s": (0.0, 0.01),
     "clock_rate": (0.9, 1.1),
     "dead_time_s": (0.0, 0.1),
 }

@@ -93,6 +93,8 @@ def spread_of(model: Model, relative: float | None = None) -> Knowledge:
         curves = len({name.rsplit(".", 1)[0] for name in names if name.split(".")[0] in (*STIFFNESS, LEARNT)})
         plain = sum(name.split(".")[0] not in (*STIFFNESS, LEARNT) for name in names)
         what = f"{plain} parameters" + (f" and {curves} curves" if curves else "")
+        open_ = [n for n, p in BASE_PARAMETERS.items() if n not in names and model.parameters[n].source == p.source]
+        what += f", with {len(open_)} as if known, since no data determine them" if open_ else ""
         return Knowledge(names, factor, f"the fit's covariance of {what}; {_words(scatter)}", scatter)
     share = SPREAD if relative is None else relative
     if not 0.0 < share <= 0.5:

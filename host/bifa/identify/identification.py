@@ -11,6 +11,7 @@ from bifa.identify.completed import described
 from bifa.identify.start import fit_statics, prepare
 from bifa.identify.static import StaticFit
 from bifa.problem.inputs import ANCHOR
+from bifa.problem.stiffness import UndeterminedError
 from bifa.problem.system import CURVE_OF, PIPE, RobotSystem
 from bifa.robot import Model
 from lacuna.estimation.fit import Fit, fit_base, rms_by_channel
@@ -91,6 +92,8 @@ def identify(
     system = prepare(dataset, model, on_progress)
     on_progress("all experiments together, pressures included")
     fit = fit_base(system, system.trials)
+    if not rms_by_channel(fit.problem.trials, fit.scaled_residuals()):
+        raise UndeterminedError("none of these trials can be simulated with the model: check their pressures and units")
     on_progress("final steps and uncertainty")
     fit = settle(fit)
     known = uncertainty(fit)

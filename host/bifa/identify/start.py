@@ -47,6 +47,8 @@ def prepare(
     statics = fit_statics(dataset)
     values = _known(dataset, model) | _supplies(dataset, model) | _areas(statics, model)
     curves = {CURVE_OF[a]: _curve(dataset, fit, values, model) for a, fit in statics.items()}
+    for actuator, fit in statics.items():
+        _refuse_unstable(actuator, fit, curves[CURVE_OF[actuator]])
     system = RobotSystem(dataset, model.with_values(values), curves, fittable(dataset, curves))
     if not system.parameters:
         raise UndeterminedError("these trials constrain no unknown parameter of the model")
@@ -96,6 +98,19 @@ def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model:
         sd_N = np.full(len(rest_m), area * _PRESSURE_SD_PSI)
         stiffness = stiffness.with_equilibria(rest_m, area * held_psi, sd_N)
     return FittedCurve(prefix, stiffness, bool(len(rest_m) or dataset.of("locomotion")))
+
+
+def _refuse_unstable(actuator: str, fit: StaticFit, curve: FittedCurve) -> None:
+    """Raise UndeterminedError for a curve without two stable states, with which nothing can be simulated."""
+    try:
+        curve.tables.at((0.0,) * len(curve.names))
+    except ModelParameterError:
+        low_mm, high_mm = (1e3 * end for end in fit.stiffness.covered_m)
+        raise UndeterminedError(
+            f"the static loadings of the {actuator} actuator at 0 psi, from {low_mm:.1f} to {high_mm:.1f} mm, show no "
+            "two stable states, in which the force rises through 0: load it from before the contracted to beyond the "
+            "extended state, and check the sign of force_N"
+        ) from None
 
 
 def _known(dataset: Dataset, model: Model) -> dict[str, float]:

@@ -55,17 +55,20 @@ class Averaging:
 
     @property
     def simulated_s(self) -> np.ndarray:
-        """Times to simulate, in order."""
-        if self.averaged_s == 0.0:
-            return self.time_s
+        """Times to simulate, in order: means over more than a sample overlap."""
+        return self.time_s if self.averaged_s == 0.0 else np.sort(self._points_s, axis=None)
+
+    @cached_property
+    def _points_s(self) -> np.ndarray:
         away_s = self.averaged_s / np.sqrt(12.0)
-        return np.fmax(np.column_stack([self.time_s - away_s, self.time_s + away_s]), 0.0).ravel()
+        return np.fmax(np.column_stack([self.time_s - away_s, self.time_s + away_s]), 0.0)
 
     def means(self, columns: Columns) -> Columns:
         """The samples, from columns at the simulated times."""
         if self.averaged_s == 0.0:
             return columns
-        return {name: column.reshape(-1, 2).mean(axis=1) for name, column in columns.items()}
+        place = np.argsort(np.argsort(self._points_s, axis=None, kind="stable")).reshape(-1, 2)
+        return {name: column[place].mean(axis=1) for name, column in columns.items()}
 
 
 @dataclass(frozen=True)

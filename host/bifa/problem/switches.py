@@ -82,7 +82,7 @@ def walk_timeline(trial: Trial) -> Timeline:
     """The switches of a walk, on the time axis of `Trial.elapsed_s`."""
     time_s = trial.elapsed_s
     commands = recorded_commands(trial.columns)
-    recorded = of_samples(time_s - trial.extra.get("command_age_s", 0.0), commands)
+    recorded = _from_0(of_samples(time_s - trial.extra.get("command_age_s", 0.0), commands))
     noted = trial.extra.get("switch_time_s")
     if noted is not None:
         return _with_times(recorded, noted)
@@ -92,6 +92,13 @@ def walk_timeline(trial: Trial) -> Timeline:
     ahead_s, tick_s, error_s = (trial.extra.get(name, 0.0) for name in ("gait_ahead_s", "tick_s", "switch_error_s"))
     settled = _settled(gait, recorded, time_s, ahead_s, tick_s, error_s)
     return settled or refine(recorded, gait, float(np.median(np.diff(time_s))))
+
+
+def _from_0(commands: Timeline) -> Timeline:
+    """The same switches, with each chamber's first entry, its state when the record begins, at time 0."""
+    time_s = np.maximum(commands.time_s, 0.0)
+    time_s[np.unique(commands.chamber, return_index=True)[1]] = 0.0
+    return Timeline(time_s, commands.chamber, commands.command)
 
 
 def _with_times(recorded: Timeline, noted: dict[str, Sequence[float]]) -> Timeline:

@@ -267,7 +267,8 @@ class RobotSystem(System):
         return self._own_values(theta), weights, extra
 
     def _plant_of(self, key: tuple[Any, ...]) -> tuple[Plant, tuple[float, float]]:
-        """The model for compiled code, and the contracted equilibria of K for the body and a small actuator."""
+        """The model for compiled code, and where body and small actuator are contracted on the records' axes: at 0 by
+        the format, but a curve fitted to static loadings has their axis."""
         named, weights, extra = key
         shapes = dict(weights)
         body, small = (
@@ -277,7 +278,8 @@ class RobotSystem(System):
         effects = {effect: dict(values) for effect, values in extra}
         values = self._unfitted | dict(zip(self.fitted, named, strict=True))
         values |= {f"{effect}.{name}": v for effect, own in effects.items() for name, v in own.items()}
-        return of_values(values, effects, body, small), (body.contracted_m, small.contracted_m)
+        zeros_m = (body.contracted_m if "body" in shapes else 0.0, small.contracted_m if "small" in shapes else 0.0)
+        return of_values(values, effects, body, small), zeros_m
 
 
 def _refuse_dead_machine(dataset: Dataset) -> None:

@@ -37,7 +37,8 @@ def verdict_sentence(record: Mapping[str, Any]) -> str:
     """Return the engine's sentence on the verdict in a record of `bifa diagnose --json` or in a campaign's summary,
     with effects and their sizes in words."""
     verdict, effects, remainder = (record[key] for key in ("verdict", "effects", "remainder"))
-    return engine_sentence(verdict, effects, remainder, lambda one: effect_words(one["name"], one["parameters"]))
+    tried = [{**near, "effects": [effect_words(n) for n in near["effects"]]} for near in record.get("nearest", ())]
+    return engine_sentence(verdict, effects, remainder, lambda one: effect_words(one["name"], one["parameters"]), tried)
 
 
 def diagnosis_page(
@@ -152,7 +153,7 @@ def noise_table(error: Mapping[str, Any]) -> PageTable:
     here = {what: label for what, label in labels.items() if error["before"].get(what) is not None}
     rows = [[label, *(_noise(error[side].get(what)) for side in sides)] for what, label in here.items()]
     for name in error["before"]["by_experiment"]:
-        rows.append([experiment_words(name), *(_noise(error[s]["by_experiment"].get(name)) for s in sides[:2]), "1.00"])
+        rows.append([experiment_words(name), *(_noise(error[s]["by_experiment"].get(name)) for s in sides[:2]), ""])
     columns = ["RMS error, in units of the noise floor", "base model", "completed model", "noise floor"]
     return PageTable(columns, rows, strong_row=1)
 

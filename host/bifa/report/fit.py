@@ -6,6 +6,7 @@ from bifa.data.dataset import conditions_of, labels_of
 from bifa.identify.doubts import repeats_apart
 from bifa.identify.identification import Identification
 from bifa.printable import counted
+from bifa.problem.system import CURVE_OF
 from bifa.report.compared_curves import compared_curves
 from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
@@ -13,8 +14,10 @@ from bifa.report.page import ChartedSection, Page, PageTable
 from bifa.report.picture import draw_chart
 from bifa.report.words import channel_words, experiment_words, parameter_words, plain, quantity, spoken, unit_of
 from lacuna.check.repeats import odd_ones
+from lacuna.diagnosis.residual_error import failed, with_residuals
 
 _MIN_CORRELATION = 0.9
+_BEYOND = 0.02  # of the stroke: by how much a stable state may lie outside the static loadings
 MAX_NOISE_RATIO = 1.1  # errors up to this many times the noise count as noise
 _REPEATS_NOTE = (
     "Here it includes all that differs from run to run, even what an effect would explain (such as a ripple with "
@@ -76,6 +79,7 @@ def remarks(found: Identification) -> list[str]:
             f"Stiffness of the {actuator} actuator: unstable point at {curve.unstable_m() * 1e3:.2f} mm, hysteresis "
             f"+-{abs(static.hysteresis_N):.2f} N, static residual {curve.residual_N:.2f} N RMS."
         )
+        lines += _beyond_the_record(found, actuator)
     named = set(found.system.fitted)
     for first, second, r in found.uncertainty.correlations(_MIN_CORRELATION):
         if first in named and second in named:
@@ -86,6 +90,9 @@ def remarks(found: Identification) -> list[str]:
     for experiment, names in needs.items():
         lines.append(f"Not determined by this data: {', '.join(names)}. What would determine it: {experiment}.")
     lines += [*repeats_apart(found.fit), *odd_ones(found.fit.problem.trials)]
+    if names := failed(with_residuals([found.fit])):
+        count = counted(len(names), "trial")
+        lines.append(f"{count} cannot be simulated with this model, and do not count: {', '.join(names)}.")
     (experiment, channel), worst = max(found.error.items(), key=lambda item: item[1])
     if worst > MAX_NOISE_RATIO:
         lines.append(
@@ -95,6 +102,24 @@ def remarks(found: Identification) -> list[str]:
     if not found.fit.solution.converged:
         lines.append("The joint fit did not converge: treat the intervals with caution.")
     return lines
+
+
+def _beyond_the_record(found: Identification, actuator: str) -> list[str]:
+    """Sentences on stable states that neither static loadings nor rests in step responses have reached."""
+    if found.system.dataset.of("step_response", actuator):
+        return []
+    curve, (low_m, high_m) = (
+        getattr(found.model, f"{CURVE_OF[actuator]}_stiffness"),
+        found.statics[actuator].stiffness.covered_m,
+    )
+    spare_m = _BEYOND * curve.stroke_m
+    states = {"contracted": low_m - curve.contracted_m, "extended": curve.extended_m - high_m}
+    return [
+        f"The static loadings of the {actuator} actuator cover {1e3 * low_m:.1f} to {1e3 * high_m:.1f} mm, so that its "
+        f"{state} state is a guess: load it to beyond that state."
+        for state, beyond_m in states.items()
+        if beyond_m > spare_m
+    ]
 
 
 def _parameters(found: Identification) -> PageTable:

@@ -12,6 +12,7 @@ from bifa.simulate.stepper import HAS_BODY, HAS_HEAD, HAS_TAIL, Mounting
 CLEAR = np.zeros((0, 0))
 ACTUATORS = ("large", "small")
 _SMALL_ACTUATORS = 3  # per head or tail segment
+_SENSOR_SPAN_PSI, _ATMOSPHERE_PSI = 15.0, 14.7  # records contain what the sensor reads, a little below vacuum included
 
 
 class SimulationError(BifaError):
@@ -50,6 +51,6 @@ def anchor(plant: Plant, pressure_psi: float) -> Mounting:
 
 
 def _pressure(value: float) -> float:
-    if not -14.7 <= value <= 14.7:
-        raise SimulationError(f"pressure_psi = {value!r} is outside its range -14.7 to 14.7")
-    return float(value)
+    if not -_SENSOR_SPAN_PSI <= value <= _SENSOR_SPAN_PSI:
+        raise SimulationError(f"pressure_psi = {value!r} is outside its range -15 to 15")
+    return max(float(value), -_ATMOSPHERE_PSI)

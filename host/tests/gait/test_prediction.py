@@ -59,6 +59,12 @@ def test_a_ripples_phase_is_another_in_every_walk():
     assert np.ptp(values(model, "regulator_ripple.phase_rad", 64)) > 6.0
 
 
+def test_parameters_that_no_data_determine_are_counted():
+    assert "of 1 parameters, with 18 as if known, since no data determine them" in spread_of(known()).text
+    weighed = {name: replace(p, source="weighed") for name, p in nominal().parameters.items()}
+    assert "as if known" not in spread_of(replace(known(), parameters=weighed)).text
+
+
 def test_without_a_fit_two_per_cent_is_called_a_guess():
     assert spread_of(nominal()).is_guess
     assert "a guess" in spread_of(nominal()).text

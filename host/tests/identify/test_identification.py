@@ -154,6 +154,19 @@ def test_too_little_data_says_what_cannot_be_had(static_only):
     assert again.model.values == found.model.values
 
 
+def test_a_stable_state_that_no_record_reaches_is_said_to_be_a_guess(lab, static_only):
+    def said(*trials):
+        return [line for line in remarks(identify(replace(static_only, trials=trials))) if "is a guess" in line]
+
+    assert not said(*static_only.trials)
+    whole = static_only.trials[0]
+    short = whole.columns["displacement_mm"] < 0.62 * whole.columns["displacement_mm"].max()
+    cut = replace(whole, columns={name: column[short] for name, column in whole.columns.items()})
+    (line,) = said(cut, *(lab.static("small", p) for p in (0.0, 8.0)))
+    assert line.startswith("The static loadings of the large actuator cover ")
+    assert "so that its extended state is a guess" in line
+
+
 @pytest.mark.soak
 def test_a_whole_session_comes_back_for_several_robots():
     hits = []

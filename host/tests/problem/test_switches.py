@@ -167,3 +167,13 @@ def test_noted_times_count_from_the_trials_begin_wherever_its_clock_stands(begin
 
 def test_noted_times_that_are_not_as_many_as_the_switches_are_not_used():
     assert switch_sd_s(step(0.5, switch_time_s=[])) == switch_sd_s(step(0.5)) > 0.0
+
+
+@pytest.mark.parametrize("age_s", [0.05, -0.05])
+@pytest.mark.parametrize("extra", [{}, {"switch_time_s": {c: list(exact(GAIT, c)) for c in CHAMBERS}}])
+def test_a_record_begins_at_0_however_old_its_commands_are(age_s, extra):
+    """Commands that follow no gait, or with noted times: nothing switches before the record begins."""
+    other = GAIT if extra else {**GAIT, "period_s": 3.4}
+    commands = walk_timeline(replace(walk(GAIT, command_age_s=age_s, **extra), gait=other))
+    for chamber in range(3):
+        assert commands.time_s[commands.chamber == chamber].min() == 0.0

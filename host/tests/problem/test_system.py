@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.data import Dataset, DatasetError
+from bifa.data import Dataset, DatasetError, Trial
 from bifa.identify.start import prepare
 from bifa.measure.plan import EXTENDED
-from bifa.problem.inputs import inputs_of
+from bifa.problem.inputs import Averaging, inputs_of
 from bifa.problem.stiffness import UndeterminedError
 from bifa.problem.system import RobotSystem, engine_effects
 from bifa.robot import ModelParameterError, nominal
 from bifa.robot.learnt import LearntCurve
-from bifa.simulate import static_loading
+from bifa.simulate import static_loading, step_response, timeline
 from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import estimate_noise
@@ -265,3 +265,29 @@ def test_a_model_with_effects_or_learnt_curves_is_no_base_model(dataset):
     completed = replace(nominal().with_effects({"choked_flow": {}}), learnt={"body_damper": curve})
     with pytest.raises(ModelParameterError, match=r"\[effects.choked_flow\], \[learnt.body_damper\].* base model"):
         prepare(dataset, completed)
+
+
+def test_without_static_loadings_displacements_count_from_the_contracted_state():
+    time_s, schedule = np.arange(600) / 100.0, timeline([(0.0, 0, 0), (0.5, 0, 1), (3.0, 0, 0)])
+    measured = step_response(nominal(), "large", time_s, schedule)
+    columns = {**measured.columns, "command": ((time_s >= 0.5) & (time_s < 3.0)).astype(float)}
+    known, extra = {"supply_negative_psi": -13.0}, {"switch_time_s": [0.5, 3.0]}
+    step = Trial("s.csv", "step_response", columns, actuator="large", pressure_psi=8.5, extra=extra)
+    system = prepare(Dataset(None, "a step alone", known, (step,), {}))
+    found = system.predict({p.name: p.value for p in system.parameters}, (), system.trials[0])
+    np.testing.assert_allclose(found["displacement_mm"], measured["displacement_mm"], atol=0.05)
+
+
+def test_means_over_more_than_a_sample_are_simulated_in_order():
+    time_s = np.arange(1, 400) / 200.0
+    means = Averaging(time_s, 0.01)
+    assert (np.diff(means.simulated_s) >= 0.0).all()
+    np.testing.assert_allclose(means.means({"clock": means.simulated_s})["clock"], time_s)
+
+
+@pytest.mark.parametrize("change", [lambda force_N: -force_N, lambda force_N: force_N + 100.0])
+def test_a_curve_without_two_stable_states_is_refused(dataset, change):
+    trials = [t for t in dataset.of("static_loading", "large") if t.pressure_psi == 0.0]
+    upset = tuple(replace(t, columns={**t.columns, "force_N": change(t.columns["force_N"])}) for t in trials)
+    with pytest.raises(UndeterminedError, match=r"of the large actuator at 0 psi, from .* no two stable states"):
+        prepare(replace(dataset, trials=upset))

@@ -245,3 +245,10 @@ VACUUM = "vacuum in 0.50 (body), 0.50 (head) and 0.50 (tail) of the cycle"
 )
 def test_an_experiment_is_told_with_its_settings(experiment, settings, words):
     assert settings_words({"experiment": experiment, "settings": settings}).replace("\N{NO-BREAK SPACE}", " ") == words
+
+
+def test_an_effect_that_would_close_most_of_the_gap_is_named_though_it_is_not_supported():
+    tried = [{"effects": ["choked_flow"], "share_of_gap": 0.93}]
+    said = verdict_sentence({"verdict": "unexplained", "effects": [], "remainder": {}, "nearest": tried})
+    assert "is supported by these data: choked flow would close 93 % of the gap" in said
+    assert "no effect of the library explains" not in said

@@ -101,7 +101,7 @@ def test_anchor_holds_what_the_paper_says_and_slides_with_less():
         (lambda m: simulate.step_response(m, "large", [0.0, np.nan], [0, 0]), "numbers"),
         (lambda m: simulate.step_response(m, "large", [0.0, 1.0], [0]), "one command"),
         (lambda m: simulate.static_loading(m, "large", [0.0, 1.0], [0.0], 1.0), "one finite displacement"),
-        (lambda m: simulate.static_loading(m, "large", [0.0, 1.0], [0.0, 1.0], 99.0), r"-14\.7 to 14\.7"),
+        (lambda m: simulate.static_loading(m, "large", [0.0, 1.0], [0.0, 1.0], 99.0), "-15 to 15"),
         (lambda m: simulate.anchor_pull(m, [0.0, 1.0], 0.0, 8.5), "rate"),
         (lambda m: simulate.walk(m), "gait"),
         (lambda m: simulate.walk(m, robot.BASELINE, time_s=[1.0, 0.5]), "decrease"),
