@@ -147,8 +147,8 @@ class Effect:
 
     The first `sizes` of `parameters` set the size of the effect: it vanishes when all of them equal `absent` (0 by
     default); the others only shape it. Parameters have local names (`force_N`) and appear in `theta` as
-    `hysteresis.force_N`. A parameter's `value` is a typical magnitude; if it is `absent`, one `scale` from there. Fits start at the typical sizes times each of
-    `start_factors` (and with the opposite sign, if the bounds allow it).
+    `hysteresis.force_N`. A parameter's `value` is a typical magnitude; if it is `absent`, one `scale` from there. Fits
+    start at the typical sizes times each of `start_factors` (and with the opposite sign, if the bounds allow it).
 
     `enters` names the term of the model that changes ("body spring", "pressure sensor"). `experiments` lists those in
     which the effect can be visible (empty: all). `own` are parameters with a separate value in every trial (a phase):
