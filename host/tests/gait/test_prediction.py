@@ -157,6 +157,7 @@ def test_at_a_cliff_the_ticks_of_the_uno_decide():
     ],
 )
 def test_where_the_integrators_error_decides_all_robots_take_finer_steps(monkeypatch, gait, draws, expected):
+    """Not if nothing is known of the robot: by 2 % robots differ by far more than integration errs."""
     seen = []
 
     def spied(robots, rows, cycles, tolerance_m, **how):
@@ -164,8 +165,11 @@ def test_where_the_integrators_error_decides_all_robots_take_finer_steps(monkeyp
         return speeds(robots, rows, cycles, tolerance_m, **how)
 
     monkeypatch.setattr("bifa.gait.prediction.speeds", spied)
-    assert len(predict_speed(nominal(), spread_of(nominal(), 1e-3), gait, draws=draws).speeds_mm_s) == draws
+    fitted = replace(spread_of(nominal(), 1e-3), is_guess=False)
+    assert len(predict_speed(nominal(), fitted, gait, draws=draws).speeds_mm_s) == draws
     assert seen == expected
+    predict_speed(nominal(), spread_of(nominal()), gait, draws=draws)
+    assert seen == [*expected, (draws + 1, 1e-6)]
 
 
 def test_how_the_uno_keeps_time_is_known_whatever_the_spread():
