@@ -277,7 +277,9 @@ def test_a_stop_drops_what_was_typed_and_has_not_begun(board, held, capsys):
     board.write = keep_back
     with Uno(board, board, seed=1) as uno:
         uno.connect()
-        uno.send_stop()
+        uno.stop()
+        while not any(line.startswith("[stopped") for line in uno.session.lines):  # or it would drop the typed lines
+            uno.status()
         conversation = Conversation(uno, SimpleNamespace(clock=board))
         conversation.type(f"{held.decode()}\nclear\nrun\n")
         assert reached.wait(PATIENCE_S)
