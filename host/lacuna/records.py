@@ -526,6 +526,7 @@ def windows(
     size = round(seconds / sample)
     even = bool((np.abs(steps - sample) < 0.5 * sample).all() and abs(steps.mean() - sample) * size < 0.5 * sample)
     digits = 3 - math.floor(math.log10(sample))  # a thousandth of a sample: smaller differences of phase are rounding
+    own = f"{table.labels['condition']}, " if "condition" in table.labels else ""
     found = []
     for place, start in enumerate(starts):
         first, last = (int(np.searchsorted(time, edge - 0.5 * sample)) for edge in (start, start + seconds))
@@ -535,7 +536,6 @@ def windows(
         phase = round(start % period, digits) if period else place
         phase = 0.0 if period and period - phase < 0.5 * sample else phase
         name = _part(table, f"window {place + 1}")
-        own = f"{table.labels['condition']}, " if "condition" in table.labels else ""
         window = _cut(table, at, name, {"condition": f"{own}from {phase:.15g} s" if period else name, "order": place})
         found.append(replace(window, time_s=time[at] - time[at][0]))
     if len(found) < 3:

@@ -13,6 +13,16 @@ import tomli_w
 
 from virtual_robot.errors import VirtualRobotError
 
+_LARGEST = 10.0  # times the modest size: beyond it some robots cannot be simulated
+
+
+def check_numbers(seed: int, size: float | None) -> None:
+    """Raise VirtualRobotError if the seed, or the factor of an effect's modest size, is out of range."""
+    if seed < 0:
+        raise VirtualRobotError(f"seed = {seed} must not be negative")
+    if size is not None and not 0.0 < size <= _LARGEST:
+        raise VirtualRobotError(f"size = {size:g} must be above 0 and at most {_LARGEST:g} times the modest size")
+
 
 def seal_of(out: Path, asked: Path | None) -> Path:
     """The file for the truth of the data set `out`: `asked`, or OUT.sealed.toml beside it. Raises VirtualRobotError if

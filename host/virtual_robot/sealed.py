@@ -20,7 +20,7 @@ import numpy as np
 import tomli_w
 
 from virtual_robot import gait
-from virtual_robot.data_folder import new_folder, seal_of, write_csv, write_head
+from virtual_robot.data_folder import check_numbers, new_folder, seal_of, write_csv, write_head
 from virtual_robot.effects import EFFECTS, LIBRARY, OUTSIDE, plant_parameters
 from virtual_robot.errors import VirtualRobotError
 from virtual_robot.plant import NOMINAL, Curve, nominal_curves
@@ -29,7 +29,6 @@ from virtual_robot.truths import foreign
 
 KINDS = ("single", "none", "pair", "outside")
 SIZES = (0.3, 1.5)
-_LARGEST = 10.0  # times the modest size: beyond it some robots cannot be simulated
 REPEATS = 3
 
 # Spread between specimens, sd of the logarithm.
@@ -137,8 +136,8 @@ def generate(
 
 
 def check_request(out: Path, effect: str | None, size: float | None, seed: int) -> None:
-    """Raise SealedError if `out` exists, if the effect is unknown or has a size without being named, or if size or seed
-    is out of range."""
+    """Raise VirtualRobotError if `out` exists, if the effect is unknown or has a size without being named, or if size
+    or seed is out of range."""
     if out.exists():
         raise SealedError(f"{out} exists already; data sets are never overwritten")
     if effect is not None and effect not in EFFECTS:
@@ -146,14 +145,6 @@ def check_request(out: Path, effect: str | None, size: float | None, seed: int) 
     if size is not None and effect is None:
         raise SealedError("the size of a drawn effect is drawn as well; name the effect")
     check_numbers(seed, size)
-
-
-def check_numbers(seed: int, size: float | None) -> None:
-    """Raise SealedError if the seed or the size is out of range."""
-    if seed < 0:
-        raise SealedError(f"seed = {seed} must not be negative")
-    if size is not None and not 0.0 < size <= _LARGEST:
-        raise SealedError(f"size = {size:g} must be above 0 and at most {_LARGEST:g} times the modest size")
 
 
 def write(folder: Path, name: str, lab: Lab, random: np.random.Generator) -> None:
@@ -192,18 +183,18 @@ def main(arguments: list[str] | None = None) -> int:
     ):
         kind.add_argument(f"--{name}", dest="kind", action="store_const", const=name, help=text)
     options = parser.parse_args(arguments)
-    seal = options.label
     try:
         if options.effect is not None and options.kind != "one":
             raise SealedError("the effect is named, so that no kind is drawn: leave one of the two out")
-        check_numbers(options.seed, options.size)
         if options.truth == "foreign":
-            foreign.generate(options.seed, options.out, options.kind, options.effect, options.size, options.form, seal)
+            foreign.generate(
+                options.seed, options.out, options.kind, options.effect, options.size, options.form, options.label
+            )
         elif options.form is not None:
             raise SealedError("--form needs --truth foreign: effects of the own truth have only one form")
         else:
             kind_of_own = {"one": "single"}.get(options.kind, options.kind)
-            generate(options.seed, options.out, kind_of_own, options.effect, options.size, seal)
+            generate(options.seed, options.out, kind_of_own, options.effect, options.size, options.label)
     except VirtualRobotError as error:
         print(error, file=sys.stderr)
         return 2

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from virtual_robot.data_folder import new_folder, seal_of, write_csv, write_head
+from virtual_robot.data_folder import check_numbers, new_folder, seal_of, write_csv, write_head
 from virtual_robot.errors import VirtualRobotError
 from virtual_robot.gait import BASELINE, EASY, LEISURELY
 from virtual_robot.truths.foreign.bench import Bench, Instruments, Plan
@@ -228,6 +228,7 @@ def generate(
     out = Path(out)
     if out.exists():
         raise DayError(f"{out} exists already; data sets are never overwritten")
+    check_numbers(seed, size)
     seal = seal_of(out, seal)
     day = Day.draw(seed, kind, effect, size, form)
     with new_folder(out) as folder:
