@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.linalg import block_diag
 from scipy.special import ndtri
 from scipy.stats import qmc
 
@@ -20,7 +21,7 @@ from bifa.simulate import Plant
 from bifa.simulate.plant import of_values, with_curve
 from bifa.simulate.tables import Family, Tabulated
 
-SPREAD = 0.02  # relative standard deviation where the model has no covariance
+SPREAD = 0.02  # relative standard deviation of what nobody has measured
 _RUNS = Scatter(friction=0.01)  # for a fit without an estimate of how runs differ
 
 
@@ -34,6 +35,7 @@ class Knowledge:
 
     names: the uncertain values, those of curves included; their covariance is factor @ factor.T, `factor` (n, k).
     scatter: what differs from run to run, and what the model leaves unexplained. is_guess: nothing was fitted.
+    guessed: how many of the names, the last ones, the fit's data do not determine.
 
     Every draw is one robot in one walk, so per-trial values of an effect, such as a ripple's phase, are drawn as well.
     Unexplained pressure is applied to both supplies, unexplained force to the body's pneumatic force.
@@ -44,11 +46,14 @@ class Knowledge:
     text: str
     scatter: Scatter = field(default_factory=Scatter)
     is_guess: bool = False
+    guessed: int = 0
 
     @property
     def naive(self) -> Knowledge:
         """The covariance alone, as if the model were exact and all runs alike."""
-        return replace(self, scatter=self.scatter.timing, text=f"{self.text.split(';')[0]} alone")
+        fitted, ways = (size - self.guessed for size in self.factor.shape)
+        text = f"{self.text.split(';')[0]} alone"
+        return Knowledge(self.names[:fitted], self.factor[:fitted, :ways], text, self.scatter.timing, self.is_guess)
 
     def plants(self, model: Model, count: int, seed: int) -> list[Plant]:
         """Draw `count` robots in flat form. Values beyond a parameter's bounds are clipped.
@@ -75,8 +80,9 @@ class Knowledge:
 
 
 def spread_of(model: Model, relative: float | None = None) -> Knowledge:
-    """Return what is known of the model: the covariance and scatter of its fit. Without a fit, or if `relative` is
-    given, every base parameter varies independently with that relative standard deviation (2 % by default)."""
+    """Return what is known of the model: the covariance and scatter of its fit, and 2 % for parameters that no data
+    determine. Without a fit, or if `relative` is given, every base parameter varies independently with that relative
+    standard deviation (2 % by default)."""
     if model.covariance is not None and relative is None:
         sd = np.sqrt(np.maximum(np.diag(model.covariance.matrix), 1e-300))
         values, vectors = np.linalg.eigh(model.covariance.matrix / np.outer(sd, sd))
@@ -94,16 +100,22 @@ def spread_of(model: Model, relative: float | None = None) -> Knowledge:
         plain = sum(name.split(".")[0] not in (*STIFFNESS, LEARNT) for name in names)
         what = f"{plain} parameters" + (f" and {curves} curves" if curves else "")
         open_ = [n for n, p in BASE_PARAMETERS.items() if n not in names and model.parameters[n].source == p.source]
-        what += f", with {len(open_)} as if known, since no data determine them" if open_ else ""
-        return Knowledge(names, factor, f"the fit's covariance of {what}; {_words(scatter)}", scatter)
+        what += f"; {100 * SPREAD:g} %, a guess, for {len(open_)} that no data determine" if open_ else ""
+        factor = block_diag(factor, _independent(model, open_, SPREAD))
+        text = f"the fit's covariance of {what}; {_words(scatter)}"
+        return Knowledge((*names, *open_), factor, text, scatter, guessed=len(open_))
     share = SPREAD if relative is None else relative
     if not 0.0 < share <= 0.5:
         raise UncertaintyError(f"spread = {share:g} must be above 0 and at most 0.5")
     names = tuple(BASE_PARAMETERS)
-    factor = np.diag([share * abs(model[name]) for name in names])
+    factor = _independent(model, names, share)
     text = f"{100 * share:g} % standard deviation of {len(names)} parameters, independent"
     text = text if relative is not None else f"{text}: a guess, without data"
     return Knowledge(names, factor, text, (model.scatter or Scatter()).timing, is_guess=True)
+
+
+def _independent(model: Model, names: Sequence[str], share: float) -> np.ndarray:
+    return np.diag([share * abs(model[name]) for name in names])
 
 
 def _words(scatter: Scatter) -> str:

@@ -34,7 +34,7 @@ def certain(tick_s):
 
 def predicted_mm_s(gait, tick_s=TICK_S):
     model = certain(tick_s)
-    return predict_speed(model, spread_of(model), gait, draws=4).speed_mm_s
+    return predict_speed(model, spread_of(model).naive, gait, draws=4).speed_mm_s
 
 
 @pytest.mark.parametrize(
