@@ -19,6 +19,7 @@ from bifa.errors import BifaError
 from bifa.files import write_text
 from bifa.measure import plan
 from bifa.measure.session import Event, run_session
+from virtual_robot.data_folder import check_new
 from virtual_robot.effects import EFFECTS
 from virtual_robot.errors import VirtualRobotError
 from virtual_robot.rig import open_rig
@@ -48,7 +49,8 @@ def generate(
     session. Raises VirtualRobotError or BifaError.
     """
     forced: dict[str, dict[str, float]] = {}
-    check_request(out, effect, size, seed)
+    check_new(out)
+    check_request(effect, size, seed)
     if effect is not None:
         random = np.random.default_rng([seed, 0xEF])
         factor = float(random.uniform(*SIZES)) if size is None else size

@@ -24,9 +24,16 @@ def check_numbers(seed: int, size: float | None) -> None:
         raise VirtualRobotError(f"size = {size:g} must be above 0 and at most {_LARGEST:g} times the modest size")
 
 
+def check_new(out: Path) -> None:
+    """Raise VirtualRobotError if the data set `out` exists."""
+    if out.exists():
+        raise VirtualRobotError(f"{out} exists already; data sets are never overwritten")
+
+
 def seal_of(out: Path, asked: Path | None) -> Path:
     """The file for the truth of the data set `out`: `asked`, or OUT.sealed.toml beside it. Raises VirtualRobotError if
-    it exists, or cannot be written."""
+    either exists, or the file cannot be written."""
+    check_new(out)
     seal = asked or out.with_name(out.name + ".sealed.toml")
     if seal.exists():
         raise VirtualRobotError(f"{seal} exists already, the truth of another data set; move it away first")

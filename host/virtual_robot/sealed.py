@@ -116,7 +116,7 @@ def generate(
     exists, or if the kind or effect is unknown.
     """
     out = Path(out)
-    check_request(out, effect, size, seed)
+    check_request(effect, size, seed)
     seal = seal_of(out, label_file)
     if kind not in KINDS:
         raise SealedError(f"no kind {kind!r}; there are {', '.join(KINDS)}")
@@ -135,11 +135,9 @@ def generate(
     return label
 
 
-def check_request(out: Path, effect: str | None, size: float | None, seed: int) -> None:
-    """Raise VirtualRobotError if `out` exists, if the effect is unknown or has a size without being named, or if size
-    or seed is out of range."""
-    if out.exists():
-        raise SealedError(f"{out} exists already; data sets are never overwritten")
+def check_request(effect: str | None, size: float | None, seed: int) -> None:
+    """Raise VirtualRobotError if the effect is unknown or has a size without being named, or if size or seed is out of
+    range."""
     if effect is not None and effect not in EFFECTS:
         raise SealedError(f"no effect {effect!r}; there are {', '.join(EFFECTS)}")
     if size is not None and effect is None:

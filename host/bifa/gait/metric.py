@@ -5,6 +5,7 @@ to be periodic. As in the paper a gait that slips scores 0, because it is hard t
 """
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -43,42 +44,50 @@ class Judged:
         return np.where(self.refused, 0.0, np.fmax(self.speed_mm_s, 0.0))
 
 
-@dataclass(frozen=True)
-class Metric:
+@dataclass(frozen=True, kw_only=True)
+class Simulated:
+    """How walks are simulated to be judged.
+
+    tolerance_m: of the integrator, per step. inclination_deg: of the pipe, uphill positive. timing: the Uno's
+    timekeeping; gaits and speeds are on its clock. looser: factor on the tolerance of the small actuators' states.
+    single: in single precision.
+    """
+
+    tolerance_m: float = 1e-5
+    inclination_deg: float = 0.0
+    timing: Scatter = _EXACT
+    looser: float = _LOOSER
+    single: bool = True
+
+    def with_tolerance(self, tolerance_m: float) -> Self:
+        """Return the metric with another tolerance, in double precision if that is below a micrometre."""
+        return replace(self, tolerance_m=tolerance_m, single=tolerance_m >= _SINGLE_M)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metric(Simulated):
     """Settled speed in a clear pipe.
 
     cycles: number simulated, from rest. judged: number of last cycles whose mean speed counts; they must agree within
     `periodic` (relative to the advance, or to 1 mm if that is more) and slip at most `slip_m` each. Slip is travel
-    while both ends slide. tolerance_m: of the integrator, per step. direction: -1 to count backward walking.
-    inclination_deg: of the pipe, uphill positive. timing: the Uno's timekeeping; gaits and speeds are on its clock.
-    unlike: every cycle differs from the one before, so that no walk settles. settled: relative difference between the
-    advances of three successive cycles at which a walk counts as settled, and the other cycles are not simulated: of
-    ten it takes five or six. 0 to simulate all. looser: factor on the tolerance of the small actuators' states. single:
-    in single precision.
+    while both ends slide. direction: -1 to count backward walking. unlike: every cycle differs from the one before, so
+    that no walk settles. settled: relative difference between the advances of three successive cycles at which a walk
+    counts as settled, and the other cycles are not simulated: of ten it takes five or six. 0 to simulate all.
     """
 
     cycles: int = 10
     judged: int = 3
     periodic: float = 1e-3
     slip_m: float = 10e-6
-    tolerance_m: float = 1e-5
     direction: int = 1
-    inclination_deg: float = 0.0
-    timing: Scatter = _EXACT
     unlike: bool = False
     settled: float = _SETTLED
-    looser: float = _LOOSER
-    single: bool = True
     terrain = CLEAR  # not a field: no obstacles
 
     @property
     def is_plain(self) -> bool:
         """Whether the metric is for walking forward through a level pipe."""
         return self.direction == 1 and self.inclination_deg == 0.0
-
-    def with_tolerance(self, tolerance_m: float) -> "Metric":
-        """Return the metric with another tolerance, in double precision if that is below a micrometre."""
-        return replace(self, tolerance_m=tolerance_m, single=tolerance_m >= _SINGLE_M)
 
     def finer(self) -> "Metric":
         """Return the metric for finalists: twenty cycles, all simulated and the last ten judged, and a far smaller
@@ -114,29 +123,20 @@ class Metric:
         return Judged(self.direction * speed_mm_s, slips | (spread > self.periodic))
 
 
-@dataclass(frozen=True)
-class Passage:
+@dataclass(frozen=True, kw_only=True)
+class Passage(Simulated):
     """Mean speed through the paper's 97 mm tunnel (section VI.B), 0 for a robot that is not through after `cycles`.
 
     Slip is allowed here: both ends may give way while the supports bend.
     """
 
     cycles: int = 16
-    tolerance_m: float = 1e-5
-    inclination_deg: float = 0.0
-    timing: Scatter = _EXACT
-    looser: float = _LOOSER
-    single: bool = True
     settled = 0.0  # not a field: no walk ends early
 
     @property
     def terrain(self) -> np.ndarray:
         """The tunnel, 10 cm ahead of the head."""
         return terrain(tunnel())
-
-    def with_tolerance(self, tolerance_m: float) -> "Passage":
-        """Return the metric with another tolerance, in double precision if that is below a micrometre."""
-        return replace(self, tolerance_m=tolerance_m, single=tolerance_m >= _SINGLE_M)
 
     def finer(self) -> "Passage":
         """Return the metric for finalists: a smaller step, in double precision."""

@@ -226,8 +226,6 @@ def generate(
     `effect`, `size` (a factor of its modest size) and `form` replace what would be drawn. Raises VirtualRobotError.
     """
     out = Path(out)
-    if out.exists():
-        raise DayError(f"{out} exists already; data sets are never overwritten")
     check_numbers(seed, size)
     seal = seal_of(out, seal)
     day = Day.draw(seed, kind, effect, size, form)
