@@ -40,7 +40,7 @@ EXAMPLES = (
     "bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static",
     "bifa experiment locomotion --inclination 10 --port virtual --out out/uphill",
     f"bifa experiment step_response --port {EXAMPLE_PORT} --watch records --out out/steps",
-    "bifa experiment anchor_pull --instrument pull.csv --telemetry out/telemetry --pressure 8.5 --out out/pull",
+    "bifa experiment anchor_pull --instrument pull.csv --telemetry out/telemetry --pressure 0 --out out/pull",
 )
 
 

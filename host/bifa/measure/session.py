@@ -100,7 +100,7 @@ def _at_own_pressure(trials: Sequence[PlannedTrial], own_psi: float) -> list[Pla
     if any(trial.parameters.get("pressure_psi") == 0.0 for trial in supplied):
         raise BifaError(
             "the set-point is 0 psi, with which nothing walks: set it in `bifa console` (`set pressure_psi 8.5`, then "
-            "`save`), or with `pressure_psi` in the gait file"
+            "`save`), or give `bifa experiment` a `--pressure`"
         )
     return supplied
 
