@@ -117,7 +117,8 @@ def experiment(
     if instrument is None:
         requires("--instrument", telemetry=telemetry, add=add)
     else:
-        requires("a rig, not --instrument", port=port, watch=watch, profile=profile, seed=seed)
+        of_rig = {"port": port, "watch": watch, "profile": profile, "seed": seed}
+        requires("a rig, not --instrument", **of_rig, repeats=repeats, cycles=cycles, quick=quick)
     check_targets(folders=(out,))
     check_port(port)
 

@@ -15,6 +15,7 @@ from bifa.errors import BifaError
 from bifa.link import LinkError, PortGoneError, RefusedError, Uno
 from bifa.measure.desk import Desk, NobodyError
 from bifa.measure.experiments import Progress, record_trial
+from bifa.measure.instrument_csv import InstrumentFileError
 from bifa.measure.own_instruments import OwnInstruments
 from bifa.measure.plan import Turn
 from bifa.measure.recording import Bench, idle, unlinked
@@ -62,8 +63,11 @@ class ByHand:
                     self._try_again(bench, uno, turn, error)
                     continue
                 if self._accepted(bench, uno, turn, trial, writer):
-                    self._instruments.keep(writer.partial / RAW)
-                    return trial
+                    try:
+                        self._instruments.keep(writer.partial / RAW)
+                        return trial
+                    except InstrumentFileError as error:
+                        self._try_again(bench, uno, turn, error)
         finally:
             self._desk.clear()
 

@@ -7,10 +7,10 @@ elsewhere. The file appears in or below the watched folder, or its path is typed
 
 import contextlib
 import shlex
-import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent import futures
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +26,10 @@ from bifa.measure.instruments import CHANNELS
 from bifa.measure.plan import PULL_MM, Turn
 
 Signature = tuple[Any, ...]
-_Record = tuple[Path, dict[str, np.ndarray]]
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".tra", ".lvm", ".dat", ".asc")
 SETTLED_S = 0.5  # a file whose size and time stay the same for so long is complete
+RESTED_S = 5.0  # the same for one that was there before its recording was to be stopped: loggers write block by block
 _READ_S = 0.3  # longest wait for a file being read: the Uno vents if it does not hear from its host for 2 s
 
 _STAND = {
@@ -38,6 +38,21 @@ _STAND = {
     "anchor_pull": "the robot's head in the pipe on the load cell, contracted",
     "locomotion": "the robot in the pipe, contracted, before the camera",
 }
+
+
+@dataclass(frozen=True)
+class _Record:
+    """A record: its columns, and the content of its file and then, if needed, of its sync file."""
+
+    columns: dict[str, np.ndarray]
+    content: dict[Path, bytes]
+
+    def refuse_changed(self) -> None:
+        """Raise InstrumentFileError if a file has changed since it was read. It may be gone."""
+        for path, content in self.content.items():
+            with contextlib.suppress(OSError):
+                if path.read_bytes() != content:
+                    raise InstrumentFileError(f"{path} has changed since it was read, as while a recording goes on")
 
 
 class OwnInstruments:
@@ -59,6 +74,7 @@ class OwnInstruments:
         self._experiment = ""
         self._known: dict[Path, Signature] = {}
         self._seen: dict[Path, tuple[Signature, float]] = {}
+        self._begun: dict[Path, Signature] = {}
         self._record: _Record | None = None
         self._reader = futures.ThreadPoolExecutor(1, thread_name_prefix="bifa-record")
         self._reading: futures.Future[_Record] | None = None
@@ -82,11 +98,8 @@ class OwnInstruments:
 
     def start(self) -> None:
         """See Instruments."""
-        self._before = {}
-        for path in self._files():
-            with contextlib.suppress(FileNotFoundError):  # deleted meanwhile
-                self._before[path] = _signature(path)
-        self._known, self._reported = {}, dict(self._before)
+        self._before = dict(_signatures_of(self._files()))
+        self._known, self._begun, self._reported = {}, {}, dict(self._before)
         machine = ROLES[self._experiment] == MACHINE  # a testing machine, which moves and measures, not a camera
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
         self._ask(
@@ -102,7 +115,7 @@ class OwnInstruments:
 
     @property
     def moving(self) -> bool:
-        """See Instruments. True until the person confirms the end of the motion or the record has appeared."""
+        """See Instruments. True until the person confirms the end of the motion."""
         return not self.ready
 
     @property
@@ -111,7 +124,7 @@ class OwnInstruments:
         is rejected."""
         if self._reading is not None:
             return self._poll_reading()
-        if self._step in ("move", "save") and self._watch is not None and self._take_new():
+        if self._step == "save" and self._watch is not None and self._take_new():
             return True
         if self._step in ("", "saved"):
             return True
@@ -128,8 +141,7 @@ class OwnInstruments:
 
     def save(self) -> None:
         """See AskedInstruments."""
-        if self._record is not None:
-            return
+        self._begun = dict(_signatures_of(self._files()))
         where, then = (
             (f"to {self._watch} ", "") if self._watch is not None else ("", ", then type the path of the first")
         )
@@ -144,17 +156,20 @@ class OwnInstruments:
 
     def stop(self) -> dict[str, np.ndarray]:
         """See Instruments; {} if the recording was aborted."""
-        return dict(self._record[1]) if self._record else {}
+        return dict(self._record.columns) if self._record else {}
 
     def keep(self, folder: Path) -> None:
-        """Copy the files of the last record unchanged into `folder`, under the trial's name."""
+        """Write the files of the last record, as they were read, into `folder`, under the trial's name. Raises
+        InstrumentFileError if a file has changed since."""
         if self._record is None:
             return
+        self._record.refuse_changed()
         folder.mkdir(parents=True, exist_ok=True)
-        target = (folder / self._turn.planned.file).with_suffix(self._record[0].suffix)
-        shutil.copyfile(self._record[0], target)
-        if self._needs_sync_file:
-            shutil.copyfile(sync_file(self._record[0]), target.with_suffix(".sync.csv"))
+        (path, record), *others = self._record.content.items()
+        target = (folder / self._turn.planned.file).with_suffix(path.suffix)
+        target.write_bytes(record)
+        for _, sync in others:
+            target.with_suffix(".sync.csv").write_bytes(sync)
 
     @property
     def _export(self) -> Export | None:
@@ -181,23 +196,20 @@ class OwnInstruments:
         not this trial's, however they are declared now."""
         for path in self._files():
             if not _is_sync(path) and path.suffix.lower() in self._suffixes:
-                sync = sync_file(path)
-                if self._needs_sync_file and not sync.exists():
-                    continue
-                with contextlib.suppress(FileNotFoundError):  # deleted meanwhile
-                    parts = (path, sync) if self._needs_sync_file else (path,)
-                    found = tuple(map(_signature, parts))
-                    if found != tuple(map(self._before.get, parts)):
-                        yield path, found
+                parts = self._parts(path)
+                found = dict(_signatures_of(parts))
+                if len(found) == len(parts) and any(self._before.get(part) != found[part] for part in parts):
+                    yield path, tuple(found.values())
+
+    def _parts(self, path: Path) -> tuple[Path, ...]:
+        """A record's file and, if needed, its sync file."""
+        return (path, sync_file(path)) if self._needs_sync_file else (path,)
 
     def _incomplete_files(self) -> Iterator[tuple[Path, Signature]]:
         """Files that are not, or not yet, part of a complete record."""
         whole = {path for path, _ in self._signatures()}
         whole |= {sync_file(path) for path in whole}
-        for path in self._files():
-            if path not in whole:
-                with contextlib.suppress(FileNotFoundError):
-                    yield path, _signature(path)
+        return _signatures_of(path for path in self._files() if path not in whole)
 
     @property
     def _suffixes(self) -> tuple[str, ...]:
@@ -219,7 +231,8 @@ class OwnInstruments:
         if before != signature:
             self._seen[path] = (signature, time.monotonic())
             return False
-        return time.monotonic() - since_s >= SETTLED_S
+        is_as_begun = signature[0] == self._begun.get(path)
+        return time.monotonic() - since_s >= (RESTED_S if is_as_begun else SETTLED_S)
 
     def _explain_unusable(self, path: Path) -> str:
         if _is_sync(path):
@@ -274,9 +287,15 @@ class OwnInstruments:
         return self._poll_reading()
 
     def _read(self, path: Path) -> _Record:
-        columns, edges = read_instrument(path, CHANNELS[self._experiment], self._export)
-        self._refuse_earlier(path)
-        return path, {**columns, "sync_time_s": edges}
+        try:
+            content = {part: part.read_bytes() for part in self._parts(path) if part.exists()}
+            columns, edges = read_instrument(path, CHANNELS[self._experiment], self._export)
+            record = _Record({**columns, "sync_time_s": edges}, content)
+            record.refuse_changed()
+            self._refuse_earlier(path, content[path])
+        except OSError as error:
+            raise InstrumentFileError(f"{error.filename} cannot be read ({error.strerror})") from None
+        return record
 
     def _poll_reading(self) -> bool:
         """Whether the file being read has turned out to be the record; reading a workbook may take many seconds."""
@@ -292,9 +311,9 @@ class OwnInstruments:
         self._reading, self._step = None, "saved"
         return True
 
-    def _refuse_earlier(self, path: Path) -> None:
+    def _refuse_earlier(self, path: Path, data: bytes) -> None:
         """Refuse the file of an earlier trial, which was saved or named by mistake."""
-        data, own = path.read_bytes(), Path(self._turn.planned.file).stem
+        own = Path(self._turn.planned.file).stem
         for old in sorted(self._kept.glob("*")):
             if old.stem != own and not _is_sync(old) and old.is_file() and old.read_bytes() == data:
                 raise InstrumentFileError(f"{path} is the record of an earlier trial, {old.name}")
@@ -308,3 +327,9 @@ def _signature(path: Path) -> tuple[int, int]:
     """Modification time and size, which change while a file is written."""
     stat = path.stat()
     return stat.st_mtime_ns, stat.st_size
+
+
+def _signatures_of(paths: Iterable[Path]) -> Iterator[tuple[Path, Signature]]:
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError):  # deleted meanwhile
+            yield path, _signature(path)

@@ -87,6 +87,7 @@ class Recording:
         self._uno.stream(True)
         self._instruments.start()
         until_ready(self._instruments, lambda: self.wait(_PIECE_S, report=False))
+        self.samples.clear()  # taken while the instrument was being started, which is no part of the trial
         self.wait(BEFORE_MARK_S, report=False)
         self._marked = self._uno.mark_strobe()
         return self

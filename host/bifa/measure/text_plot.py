@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bifa.data import Trial
+from bifa.data.read import LARGEST
 
 WIDEST, HEIGHT = 60, 6  # characters; a character of braille is 2 by 4 dots
 _DENSE = 8  # points per sample
@@ -42,7 +43,9 @@ def panel(x: np.ndarray, y: np.ndarray, below: str, above: str, plain: bool = Fa
 
 
 def _joined(values: np.ndarray) -> np.ndarray:
-    """Interpolate linearly between samples, so densely that the dots touch; shape ((samples - 1) * _DENSE,)."""
+    """Interpolate linearly between samples, so densely that the dots touch; shape ((samples - 1) * _DENSE,). Values
+    beyond any measurement, which no data set may have but an export might, are drawn at that limit."""
+    values = np.clip(values, -LARGEST, LARGEST)
     return np.interp(np.arange(0, len(values) - 1, 1 / _DENSE), np.arange(len(values)), values)
 
 

@@ -289,6 +289,8 @@ EXPERIMENT = ["experiment", "--out", "{missing}"]
         ([*EXPERIMENT, "step_response", "--rate", "5"], "--rate requires static_loading, anchor_pull or all"),
         ([*EXPERIMENT, "all", "--telemetry", "{here}", "--add"], "--telemetry and --add require --instrument"),
         ([*EXPERIMENT, "all", "--instrument", "{here}", "--watch", "x"], "--watch requires a rig, not --instrument"),
+        ([*EXPERIMENT, "all", "--instrument", "{here}", "--quick"], "--quick requires a rig, not --instrument"),
+        ([*EXPERIMENT, "all", "--instrument", "{here}", "--repeats", "7"], "--repeats requires a rig"),
         ([*EXPERIMENT, "all", "--bench", "{missing}"], "does not exist"),
         ([*EXPERIMENT, "locomotion", "--pressure", "0"], "at 0 psi nothing walks"),
     ],
@@ -423,3 +425,9 @@ def test_every_example_has_a_line_of_its_own(shown):
         assert all(f"bifa {name}" in example or name == "rig" for example in examples[1:])
         end = re.sub(r" *\n", "\n", helps[name].partition("Examples:")[2])
         assert [squeezed(example) for example in end.strip().split("\n\n")] == examples[1:]
+
+
+def test_where_a_campaign_writes_the_answers_is_checked_before_anything_is_asked(tmp_path):
+    bench = str(tmp_path / "none" / "bench.toml")
+    result = invoke("campaign", "--port", "/dev/x", "--out", str(tmp_path / "out"), "--bench", bench)
+    assert "none does not exist; create it first" in str(result.exception)

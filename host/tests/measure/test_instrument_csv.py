@@ -139,11 +139,13 @@ def test_a_step_takes_its_commands_from_the_telemetry(files):
     assert moved - switched == pytest.approx(0.5, abs=0.011)
 
 
-@pytest.mark.parametrize("files", ["marked"], indirect=True)
-def test_a_walk_that_was_filmed_from_its_middle_on_is_refused(files):
+def walked(files, *spans_s):
+    """Replace the pull by a walk commanded during `spans_s`; return a function that imports it as filmed from a time
+    on."""
     telemetry = files / "telemetry_1.csv"
     header, *rows = telemetry.read_text().splitlines()
-    commands = [",0,1,1" if float(row.split(",")[0]) >= 2.0 else ",,," for row in rows]
+    times_s = (float(row.split(",")[0]) for row in rows)
+    commands = [",0,1,1" if any(low <= t < high for low, high in spans_s) else ",,," for t in times_s]
     named = ",".join([header, *(f"command_{chamber}" for chamber in CHAMBERS)])
     telemetry.write_text("\n".join([named, *map(str.__add__, rows, commands), ""]))
     (files / "pull.sync.csv").rename(files / "cam.sync.csv")
@@ -154,9 +156,21 @@ def test_a_walk_that_was_filmed_from_its_middle_on_is_refused(files):
         write(files / "cam.csv", {"time_s": own(camera_s), "displacement_head_mm": 8.0 * np.maximum(camera_s - 2.0, 0)})
         return import_trial(files / "cam.csv", telemetry, walk, files / f"from_{begins_s:g}")[0]
 
+    return filmed_from
+
+
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_a_walk_that_was_filmed_from_its_middle_on_is_refused(files):
+    filmed_from = walked(files, (2.0, np.inf))
     assert filmed_from(1.5).trials[0].columns["displacement_head_mm"][0] == pytest.approx(0.0, abs=0.1)
     with pytest.raises(DatasetError, match=r"cam\.csv.*begins 1\.50 s too late: it has to cover the whole"):
         filmed_from(3.5)
+
+
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_two_walks_of_one_telemetry_are_not_joined(files):
+    with pytest.raises(DatasetError, match=r"the telemetry has several times .* commanded, 2\.0 s apart"):
+        walked(files, (2.0, 4.0), (6.0, np.inf))(1.5)
 
 
 def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):

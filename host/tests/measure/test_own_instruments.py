@@ -10,7 +10,7 @@ import pytest
 from bifa.measure import own_instruments
 from bifa.measure.bench_file import read_exports
 from bifa.measure.desk import Desk
-from bifa.measure.instrument_csv import read_instrument
+from bifa.measure.instrument_csv import InstrumentFileError, read_instrument
 from bifa.measure.own_instruments import OwnInstruments
 from bifa.measure.plan import PlannedTrial, Turn
 from harness.exports import EXPORTS
@@ -33,12 +33,17 @@ def said():
     return []
 
 
-def recorded(own, kept):
-    """Mount and start a pull, and request its record."""
+def started(own, kept):
+    """Mount a pull and start its recording."""
     own.begin(Turn(PlannedTrial("anchor_pull", None, 8.5, 20.0), 2, 2), kept)
     own.mount("anchor_pull")
     own.start()
-    own.save()
+    return own
+
+
+def recorded(own, kept):
+    """Mount and start a pull, and request its record."""
+    started(own, kept).save()
     return own
 
 
@@ -200,3 +205,73 @@ def test_a_file_that_was_there_at_the_start_is_no_record_however_it_is_declared_
     (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
     assert looked(own, seconds=PATIENCE_S), said
     np.testing.assert_allclose(own.stop()["force_N"], RECORD["force_N"], atol=2e-3)
+
+
+DECLARED = '[instrument.machine]\npreset = "testxpert"\n'
+
+
+@pytest.fixture
+def logging(watching):
+    """A pull whose logger has written half of its record so far, and that record's file."""
+    own, folder = watching(DECLARED)
+    started(own, folder.parent / "raw")
+    path = folder / "pull.TRA"
+    half = {name: values[:25] for name, values in RECORD.items()}
+    path.write_bytes(EXPORTS["testxpert"].write(half))
+    path.with_suffix(".sync.csv").write_text(SYNC)
+    return own, path
+
+
+def test_a_file_that_a_logger_writes_block_by_block_is_no_record_while_the_cross_head_moves(logging, said):
+    own, path = logging
+    own.move()
+    assert not looked(own, seconds=1.0), "taken in the middle of the motion"
+    own.save()
+    assert not looked(own, seconds=1.0), "taken between two blocks"
+    path.write_bytes(EXPORTS["testxpert"].write(RECORD))
+    assert looked(own, seconds=PATIENCE_S), said
+    assert len(own.stop()["force_N"]) == 50
+
+
+def test_a_record_that_was_complete_when_it_was_asked_for_is_taken_after_a_rest(logging, monkeypatch, said):
+    monkeypatch.setattr(own_instruments, "RESTED_S", 1.0)
+    own, _ = logging
+    own.save()
+    assert looked(own, seconds=PATIENCE_S), said
+
+
+def test_what_is_kept_is_what_was_read_even_if_its_file_is_gone(watching, said):
+    own, folder = watching(DECLARED)
+    path = folder / "pull.TRA"
+    path.write_bytes(EXPORTS["testxpert"].write(RECORD))
+    path.with_suffix(".sync.csv").write_text(SYNC)
+    assert looked(own, seconds=PATIENCE_S), said
+    content = path.read_bytes()
+    path.unlink()
+    own.keep(folder.parent / "raw")
+    assert (folder.parent / "raw" / "anchor_8.5psi_20mm_s_1.TRA").read_bytes() == content
+
+
+def test_a_record_that_went_on_after_it_was_read_is_not_kept(watching, said):
+    own, folder = watching(DECLARED)
+    path = folder / "pull.TRA"
+    path.write_bytes(EXPORTS["testxpert"].write(RECORD))
+    path.with_suffix(".sync.csv").write_text(SYNC)
+    assert looked(own, seconds=PATIENCE_S), said
+    path.write_bytes(path.read_bytes() + b"1;2;3\n")
+    with pytest.raises(InstrumentFileError, match=r"pull\.TRA has changed since it was read"):
+        own.keep(folder.parent / "raw")
+    assert not (folder.parent / "raw").exists()
+
+
+def test_a_file_that_cannot_be_read_is_reported(watching, said, monkeypatch):
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied", "pull.TRA")
+
+    monkeypatch.setattr(own_instruments, "read_instrument", refuse)
+    own, folder = watching(DECLARED)
+    path = folder / "pull.TRA"
+    path.write_bytes(EXPORTS["testxpert"].write(RECORD))
+    path.with_suffix(".sync.csv").write_text(SYNC)
+    assert looked(own, lambda: said)
+    assert "pull.TRA cannot be read (Permission denied)" in said[0]

@@ -13,7 +13,7 @@ from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.lock import LockedError, locked
 from bifa.measure.experiments import STEP_DOWN_S, STEP_UP_S, record_trial
 from bifa.measure.plan import EXPERIMENTS, PlannedTrial, session
-from bifa.measure.recording import Recording, bench_of
+from bifa.measure.recording import Bench, Recording, bench_of
 from bifa.measure.session import provenance, run_session
 from bifa.problem.switches import seconds_per_uno_s, valves_of, walk_timeline
 from bifa.problem.system import spare
@@ -281,6 +281,31 @@ def test_every_edge_is_the_sample_that_the_uno_says(seed):
             edges_s = tape.record["sync_time_s"]
             truth_s = 0.01 + (true_s(clock, edges_s) - first_s) * uno_rate
             assert tape.clock.to_uno(edges_s) == pytest.approx(truth_s, abs=2e-4)
+
+
+class SlowToStart:
+    """Instruments that record only after they have been asked eight times whether they do."""
+
+    def __init__(self, instruments):
+        self._instruments, self._asked = instruments, 0
+
+    def __getattr__(self, name):
+        return getattr(self._instruments, name)
+
+    @property
+    def ready(self):
+        self._asked += 1
+        return self._asked > 8
+
+    def save(self):
+        pass
+
+
+@pytest.mark.uno
+def test_what_the_uno_sends_before_the_instrument_records_is_no_part_of_the_trial(rig, uno):
+    with Recording(Bench(SlowToStart(rig.instruments), rig.clock), uno) as tape:
+        tape.wait(0.5)
+    assert 50 < len(tape.samples) < 80, "the wait alone is 200 samples"
 
 
 @pytest.mark.uno

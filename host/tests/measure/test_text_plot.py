@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bifa.data import Trial
-from bifa.measure.text_plot import WIDEST, text_plot
+from bifa.measure.text_plot import WIDEST, panel, text_plot
 
 MOVED_MM = np.linspace(0.0, 53.4, 400)
 PULL = Trial(
@@ -24,3 +24,9 @@ def test_no_line_is_wider_than_the_terminal_and_none_is_wasted(columns, plain):
     assert max(map(len, lines)) <= columns
     assert max(map(len, lines)) >= min(columns, WIDEST + 9) - 2
     assert lines[-1].split() == ["0.0", "displacement", "[mm]", "53.4"]
+
+
+def test_a_column_whose_differences_overflow_is_drawn():
+    lines = panel(np.arange(4.0), np.array([0.0, 1e308, -1e308, 0.0]), "row", "force")
+    assert len(lines) > 3
+    assert max(map(len, lines)) <= 80
