@@ -146,10 +146,10 @@ wheels: $(python) $(stamps)/firmware
 	@$(bin)/python tools/wheels.py $(ARGS)
 
 clean:
-	@rm -rf .pio build dist bench.json host/build host/*/build host/*.egg-info host/lacuna/*.egg-info host/virtual_robot/*.egg-info compile_commands.json
+	@rm -rf .pio build dist host/build host/*/build host/*.egg-info host/lacuna/*.egg-info host/virtual_robot/*.egg-info compile_commands.json
 	find host tools schema -name __pycache__ -prune -exec rm -rf {} +
 	find host/virtual_robot -name '*.so' -delete
 	rm -rf .ruff_cache host/.pytest_cache host/.ruff_cache host/.hypothesis host/.import_linter_cache
 
 distclean: clean
-	@rm -rf .venv .platformio
+	@rm -rf .venv .platformio bench.json

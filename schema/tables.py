@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
@@ -148,15 +149,19 @@ def parameter_table() -> ParameterTable:
     formats = [p.since for p in parameters]
     if formats != sorted(formats):
         raise ValueError("order parameters by `since`, so that an older record is a prefix of a new one")
-    presets = [
-        Preset(
-            row["name"],
-            row["help"],
-            tuple(_to_wire(row[p.name], p.decimals) if p.name in row else p.default for p in parameters),
-        )
-        for row in raw["preset"]
-    ]
-    return ParameterTable(raw["storage_format"], tuple(parameters), tuple(presets))
+    presets = tuple(_preset(row, parameters) for row in raw["preset"])
+    return ParameterTable(raw["storage_format"], tuple(parameters), presets)
+
+
+def _preset(row: dict, parameters: Sequence[Parameter]) -> Preset:
+    name = row["name"]
+    if unknown := row.keys() - {"name", "help", *(p.name for p in parameters)}:
+        raise ValueError(f"preset {name}: no parameter {', '.join(sorted(unknown))}")
+    values = tuple(_to_wire(row[p.name], p.decimals) if p.name in row else p.default for p in parameters)
+    for parameter, value in zip(parameters, values, strict=True):
+        if not parameter.minimum <= value <= parameter.maximum:
+            raise ValueError(f"preset {name}: {parameter.name} is out of range")
+    return Preset(name, row["help"], values)
 
 
 def _message(row: dict) -> Message:

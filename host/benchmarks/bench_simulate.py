@@ -15,7 +15,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from bifa import robot, simulate
-from bifa.gait import paper_space
 from bifa.robot import Gait, Model, StiffnessCurve
 
 CYCLES = 4
@@ -44,25 +43,20 @@ def run() -> dict[str, float]:
     each = np.array([_our_time(model, row) for row in rows])
     ended = theirs < LONGEST_S
     speedup = float(theirs[ended].sum() / each[ended].sum())
-    batch = np.tile(rows, (200, 1))
+    batch = np.vstack([_like(row) for row in rows])
     single, alone = _timed(lambda: simulate.speeds(model, batch, CYCLES, workers=1))
     together, both = _timed(lambda: simulate.speeds(model, batch, CYCLES))
     single, alone, together, both = (seconds / len(batch) for seconds in (single, alone, together, both))
-    halves, pieces = _dealt(model)
     settled, transient = (
         [reference_error(model, rows, cycles, step) for step in (SEARCHING_M, FINE_M)]
         for cycles in (SETTLED_CYCLES, CYCLES)
     )
-    print(f"one gait, {CYCLES} cycles, bifa, one core: {alone * 1e3:8.3f} ms")
+    print(f"one gait, {CYCLES} cycles, bifa, one core, in lanes with others: {alone * 1e3:8.3f} ms")
     cores = simulate.cores()
     print(f"evaluations per second, one core {1 / alone:.0f}; {cores} cores {1 / together:.0f} with what else ran")
     print(
         f"{cores} threads over one: {single / together:.2f} times as fast by the clock; "
         f"by the processor's time {cores * alone / both:.2f}, what threads cost each other"
-    )
-    print(
-        f"  gaits differ in cost: of batches of 50, dealt out in halves as prange does, {halves:.2f} times as fast at "
-        f"most; in small pieces {pieces:.2f}; the rest is what else ran"
     )
     print(
         f"ratio on one core, the {np.count_nonzero(ended)} gaits that LSODA finished: {speedup:.0f} (required: 20000); "
@@ -80,8 +74,6 @@ def run() -> dict[str, float]:
         "gait_evaluation_lsoda_s": float(theirs[ended].mean()),
         "gait_evaluation_core_scaling": single / together,
         "gait_evaluation_core_scaling_processor": cores * alone / both,
-        "gait_evaluation_scaling_halves": halves,
-        "gait_evaluation_scaling_pieces": pieces,
         "gait_settled_error_searching": settled[0],
         "gait_settled_error_predicting": settled[1],
         "gait_transient_error_searching": transient[0],
@@ -101,8 +93,14 @@ def _papers_time(model: Model, gait: Gait, threshold_m_s: float, ours_mm_s: floa
     return seconds
 
 
-def _our_time(model: Model, row: np.ndarray, times: int = 200) -> float:
-    return _timed(lambda: simulate.speeds(model, np.tile(row, (times, 1)), CYCLES, workers=1))[1] / times
+def _our_time(model: Model, row: np.ndarray) -> float:
+    rows = _like(row)
+    return _timed(lambda: simulate.speeds(model, rows, CYCLES, workers=1))[1] / len(rows)
+
+
+def _like(row: np.ndarray, count: int = 200) -> np.ndarray:
+    """Gaits within a thousandth of a gait `row`, since equal ones would share every step of the integrator."""
+    return row * np.random.default_rng(0).uniform(0.999, 1.001, (count, len(row)))
 
 
 def _timed(job) -> tuple[float, float]:
@@ -110,21 +108,6 @@ def _timed(job) -> tuple[float, float]:
     clock, used = time.perf_counter(), time.process_time()
     job()
     return time.perf_counter() - clock, time.process_time() - used
-
-
-def _dealt(model: Model, batches: int = 8, batch: int = 50, pieces: int = 16) -> tuple[float, float]:
-    """Greatest possible speed-up by two undisturbed threads, given the costs of single gaits: with a batch split in two
-    halves, and in small pieces that go to whichever thread is free."""
-    rows = simulate.gait_rows(paper_space().gaits(np.random.default_rng(0).random((batches * batch, 5))))
-    costs = np.array([min(_our_time(model, row, 1) for _ in range(3)) for row in rows]).reshape(batches, batch)
-    ends = np.zeros((2, batches))
-    for number, cost in enumerate(costs):
-        ends[0, number] = max(part.sum() for part in np.array_split(cost, 2))
-        busy = [0.0, 0.0]
-        for part in np.array_split(cost, pieces):
-            busy[int(np.argmin(busy))] += part.sum()
-        ends[1, number] = max(busy)
-    return tuple((costs.sum(axis=1) / ends).mean(axis=1))
 
 
 def reference_error(model: Model, rows: np.ndarray, cycles: int, tolerance_m: float) -> float:

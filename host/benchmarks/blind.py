@@ -31,7 +31,7 @@ from benchmarks import records as lines
 from benchmarks import small_systems
 from benchmarks.blind_figures import BASELINES, CLOSE, brief, name_of, report, said_of, table
 from benchmarks.cost import SimulationCount, processor_s
-from benchmarks.search_record import searched, write_losses
+from benchmarks.search_record import searched, version, write_losses
 from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
 
@@ -75,9 +75,9 @@ def jobs(truth: str, counts: dict[str, int], first_seed: int) -> list[Job]:
 
 def diagnose_sealed(job: Job, out: Path, threads: int) -> dict:
     """Draw, diagnose on `threads` threads, and only then open the label. Return the record kept for the data set."""
-    kept = out / f"{job.truth}-{job.kind}-{job.seed}.json"
-    if kept.exists():
-        return json.loads(kept.read_text())
+    kept = out / f"{job.truth}-{job.kind}-{job.effect or 'drawn'}-{job.seed}.json"
+    if kept.exists() and (record := json.loads(kept.read_text()))["version"] == version():
+        return record
     with tempfile.TemporaryDirectory() as scratch:
         folder, verdict = Path(scratch) / "sealed", Path(scratch) / "verdict.json"
         kind = "one" if job.kind == "single" else job.kind

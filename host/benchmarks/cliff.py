@@ -49,7 +49,7 @@ class Step:
 
 def at_the_cliff(model: Model, gait: Gait) -> list[tuple[float, Prediction]]:
     """Shares by which the period is shorter, and the prediction there, for each of the probabilities `WANTED`; empty
-    for a gait that all robots walk with, however fast."""
+    for a gait with which more than the lowest of these walk, however fast."""
     predictor = Predictor(model, spread_of(model))
 
     def predicted(faster: float) -> Prediction:

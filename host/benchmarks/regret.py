@@ -35,7 +35,7 @@ from bifa.gait.library.scenarios import SCENARIOS
 from bifa.gait.objectives import NominalSpeed, distribution
 from bifa.gait.pool import Simulations
 from bifa.gait.search import EVALUATIONS
-from bifa.gait.uncertainty import SPREAD
+from bifa.gait.uncertainty import SPREAD, spread_of
 from bifa.robot import BASE_PARAMETERS, Model, load_model, nominal, strong_push
 from bifa.simulate import gait_rows, plant
 
@@ -148,7 +148,8 @@ class _SpentError(Exception):
 def peer(minimize: Callable[..., object], model: Model, settings: Settings, budget: int, runs: Simulations) -> float:
     """Run one of SciPy's optimizers on the search's own objective, for `budget` evaluations; as in the search, the best
     of the gaits tried are judged again by the finer metric."""
-    speed = NominalSpeed(runs, plant(model), settings.space, settings.metric)
+    metric = settings.metric_for(model, spread_of(model, settings.spread))
+    speed = NominalSpeed(runs, plant(model), settings.space, metric)
     tried: list[tuple[float, np.ndarray]] = []
 
     def slowness(point: np.ndarray) -> float:
@@ -160,7 +161,7 @@ def peer(minimize: Callable[..., object], model: Model, settings: Settings, budg
     with contextlib.suppress(_SpentError):
         minimize(slowness, [(0.0, 1.0)] * len(settings.space.axes), budget)
     best = np.array([point for _, point in sorted(tried, key=lambda one: -one[0])[:_JUDGED]])
-    return float(NominalSpeed(runs, plant(model), settings.space, settings.metric.finer())(best).max())
+    return float(NominalSpeed(runs, plant(model), settings.space, metric.finer())(best).max())
 
 
 def regrets(record: dict) -> list[float]:

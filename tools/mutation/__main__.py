@@ -38,7 +38,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="how many run at once (default: %(default)s)")
     options = parser.parse_args(arguments)
     equivalent = listed()
+    if missing := [str(place) for place in options.files if not (PROJECT / place).exists()]:
+        parser.error(f"there is no {', '.join(missing)}")
     chosen = everything(options.files or [Path("lib") / folder for folder in FOLDERS])
+    if not chosen:
+        parser.error("these files have nothing to mutate: give sources of the controller")
     stale = [] if options.files else equivalent.keys() - {mutant.key for mutant in chosen}
     if options.sample is not None:
         chosen = sorted(chosen, key=_by_chance)[: options.sample]

@@ -40,7 +40,7 @@ def fingerprint(core_dir: Path) -> str:
     sha = hashlib.sha256()
     for word in (platformio.__version__, SCons.__version__, SCons.__file__, sys.prefix, str(core_dir.resolve())):
         sha.update(word.encode() + b"\0")
-    for path in sorted(TOOLS.rglob("*")):
+    for path in sorted(path for folder in ("provision", "stand_ins") for path in (TOOLS / folder).rglob("*")):
         if path.is_file() and "__pycache__" not in path.parts:
             sha.update(path.relative_to(TOOLS).as_posix().encode() + b"\0" + path.read_bytes())
     return sha.hexdigest()

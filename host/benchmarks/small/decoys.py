@@ -77,7 +77,7 @@ def _one_sided(signal: np.ndarray, share: np.ndarray, size: float) -> np.ndarray
     return signal + size * np.maximum(signal, 0.0)
 
 
-_EITHER, _RISING = (-0.5, 0.5), (0.0, 0.5)
+_EITHER = (-0.5, 0.5)
 DECOYS: dict[str, Decoy] = {
     "input_dead_zone": Decoy(True, 0.08, (0.0, 1.0), _dead),
     "input_limit": Decoy(True, 0.8, (0.1, np.inf), _limited, np.inf),

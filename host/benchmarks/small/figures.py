@@ -67,11 +67,16 @@ def report(records: Sequence[dict]) -> None:
     print(f"{'':28}{'right':28}{'predicts off by, noises':26}processor, s; simulations")
     print(f"{'':28}{'':28}{'single  none  withheld':26}medians")
     same = [r for r in records if "peers" in r] or records  # if peers were run, only on their sets
-    print(_row("lacuna", same, [right(r, named(r)) for r in same], same))
+    hits = [r["verdict"] != "crash" and right(r, named(r)) for r in same]
+    print(_row("lacuna", same, hits, same))
+    steady = [_steady_share("lacuna", same, hits)]
     for peer in dict.fromkeys(name for r in records for name in r.get("peers", {})):
         asked = [(r, r["peers"][peer]) for r in records if peer in r.get("peers", {}) and _applies(peer, r)]
-        hits = [right(r, p["named"]) for r, p in asked if p["named"] is not None]
+        saying = [(r, p["named"]) for r, p in asked if p["named"] is not None]
+        hits = [right(r, said) for r, said in saying]
         print(_row(peer, [r for r, _ in asked], hits, [p for _, p in asked]))
+        steady += [_steady_share(peer, [r for r, _ in saying], hits)] if hits else []
+    print("right where nothing drifts, since only the engine is told of a drift", *steady, sep="\n")
     print("\nby kind of system: one effect named first, no effect `none`, both of two named")
     for system in dict.fromkeys(r["system"] for r in records):
         found = list(rates([r for r in records if r["system"] == system]).values())
@@ -82,6 +87,11 @@ def report(records: Sequence[dict]) -> None:
         pairs = Counter((name_of(r["truth"]), said_of(r)) for r in records if r["kind"] == kind)
         for (truth, said), count in sorted(pairs.items()):
             print(f"  {kind:9}{count:3d}  {truth:38} {said}")
+
+
+def _steady_share(name: str, records: Sequence[dict], hits: Sequence[bool]) -> str:
+    steady = [hit for r, hit in zip(records, hits, strict=True) if "drifts" not in r.get("instrument", ())]
+    return f"{name:28}{share_text(steady)}"
 
 
 def _row(name: str, records: Sequence[dict], hits: Sequence[bool], answers: Sequence[dict]) -> str:

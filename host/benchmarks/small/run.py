@@ -51,7 +51,7 @@ def asked(offered: Offered, sealed: Sealed) -> dict[str, dict[str, Any]]:
             answer = solve(given)
             named, off = answer.named, predicted_off(offered, sealed, answer.predict)
         except (ValueError, ArithmeticError, np.linalg.LinAlgError):  # no model of its path can be simulated
-            named, off = (), None
+            named, off = ("failed",), None  # which is wrong even if there was nothing to name
         named = None if named is None else list(named)
         found[name] = {"named": named, "off": off, "processor_seconds": time.process_time() - began}
     return found

@@ -12,6 +12,7 @@ import tomli_w
 
 from bifa.errors import BifaError
 from bifa.link.table import PROTOCOL_VERSION, TABLE_HASH
+from bifa.version import __version__
 
 FOLDER = Path(__file__).parent
 HEX, HEAD = "uno.hex", "uno.toml"
@@ -80,10 +81,11 @@ def _noted(path: Path) -> Image:
 
 
 def _check_tables(image: Image, path: Path) -> None:
-    if (image.protocol, image.table) != (PROTOCOL_VERSION, f"{TABLE_HASH:08x}"):
+    ours = (__version__, PROTOCOL_VERSION, f"{TABLE_HASH:08x}")
+    if (image.version, image.protocol, image.table) != ours:
         raise ImageError(
-            f"{path} has protocol {image.protocol}, table {image.table}; "
-            f"this host speaks protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}: rebuild the firmware"
+            f"{path} has version {image.version}, protocol {image.protocol}, table {image.table}; this host has "
+            "version {}, protocol {}, table {}: rebuild the firmware".format(*ours)
         )
 
 

@@ -151,6 +151,11 @@ class Settings:
         """The metric that applies: a robust search judges the model itself by the rules for drawn robots."""
         return self.metric.of_draws() if self.robust else self.metric
 
+    def metric_for(self, model: Model, known: Knowledge) -> Metric | Passage:
+        """The metric as the model needs it: with its timekeeping, and over whole walks if none of its walks settles."""
+        metric = replace(self.metric, timing=known.scatter.timing)
+        return metric if settles(model) else metric.of_unlike_cycles()
+
     @property
     def fine_m(self) -> float:
         """Tolerance of the integrator, per step, when gaits are compared with one another and verified."""
@@ -264,10 +269,8 @@ def optimize(
     started = runs.count
     known = spread_of(model, settings.spread)
     known = known.naive if settings.naive else known
-    metric = replace(settings.metric, timing=known.scatter.timing)
-    if not settles(model):
-        metric = metric.of_unlike_cycles()
-    settings = replace(settings, metric=metric)
+    settings = replace(settings, metric=settings.metric_for(model, known))
+    metric = settings.metric
     search = SearchRun(model, runs, known, settings, on_progress or SearchRun.on_progress)
     rules = settings.rules.quicker() if settings.robust else metric
     own = NominalSpeed(runs, plant(model), settings.space, rules)

@@ -1,5 +1,6 @@
 """The files generated from the table are in step with it."""
 
+import importlib
 import re
 import subprocess
 import sys
@@ -86,3 +87,22 @@ def test_files_and_the_reference_know_each_parameter_with_its_range_on_the_uno()
         assert RANGES[parameter.name] == (*bounds, parameter.unit)
         default = f"{from_wire(parameter.name, parameter.default):g} {parameter.unit}".rstrip()
         assert f"| `{parameter.name}` | {range_text(parameter)} | {default} |" in page
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("periods_s = 3.0", "preset baseline: no parameter periods_s"),
+        ("pressure_psi = 20.0", "preset baseline: pressure_psi is out of range"),
+        ("period_s = 600.0", "preset baseline: period_s is out of range"),
+    ],
+)
+def test_a_factory_preset_that_nobody_may_set_is_refused(monkeypatch, tmp_path, line, says):
+    monkeypatch.syspath_prepend(str(ROOT / "schema"))
+    tables = importlib.import_module("tables")
+    for path in tables.FOLDER.glob("*.toml"):
+        text = path.read_text().replace('name = "baseline"\n', f'name = "baseline"\n{line}\n')
+        (tmp_path / path.name).write_text(text)
+    monkeypatch.setattr(tables, "FOLDER", tmp_path)
+    with pytest.raises(ValueError, match=says):
+        tables.parameter_table()

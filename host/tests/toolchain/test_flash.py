@@ -236,6 +236,12 @@ def test_an_image_of_other_tables_is_neither_taken_up_nor_written(package, monke
         write_image(BUILT, tmp_path)
 
 
+def test_an_image_of_another_version_is_not_taken_up(package, monkeypatch):
+    monkeypatch.setattr("bifa.firmware.__version__", "0.0.1")
+    with pytest.raises(ImageError, match=r"this host has version 0\.0\.1.*rebuild the firmware"):
+        carried_image(package)
+
+
 def test_an_image_knows_itself_and_what_is_none_of_bifa_is_refused(tmp_path):
     assert image_of(BUILT).table == f"{TABLE_HASH:08x}"
     (tmp_path / "blink.hex").write_text(":0400000001020304F2\n:00000001FF\n")

@@ -69,6 +69,13 @@ def test_every_listed_equivalent_is_a_mutant_of_the_safety_code_and_has_a_reason
     assert all(reason.strip() for reason in listed.values())
 
 
+@pytest.mark.parametrize(("place", "says"), [("lib/valve", "there is no lib/valve"), ("docs", "nothing to mutate")])
+def test_a_place_without_mutants_is_refused(capsys, place, says):
+    with pytest.raises(SystemExit):
+        command.main([place])
+    assert says in capsys.readouterr().err
+
+
 GONE = [("gone.cpp",)]
 
 
