@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 from benchmarks import records as lines
 from benchmarks.blind_figures import wilson
+from benchmarks.search_record import claim
 from bifa.campaign.again import fastest_at_edge
 
 SEEDS, FIRST_SEED, JOBS, OUT = 10, 1000, 2, Path("../out/demos")
@@ -95,6 +96,7 @@ def summed_up(stories: Sequence[Story]) -> dict[str, float]:
 
 def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) -> dict[str, float]:
     """Print the table, a line as each demo ends; return the figures flat."""
+    claim(out)
     known = lines.read(kept, "seed")
     print(HEADING)
     stories = []

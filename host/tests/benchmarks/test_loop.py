@@ -53,7 +53,7 @@ def test_means_over_robots(capsys):
     assert figures["loop_naive_walks"] == pytest.approx(0.5)
     assert figures["loop_naive_brier"] == pytest.approx(0.5 * (0.03**2 + 0.97**2))
     assert figures["loop_edge_holds_90"] == 1.0
-    assert figures["loop_edge_worst_behind_base"] == pytest.approx(0.0)
+    assert figures["loop_edge_worst_ahead_of_base"] == pytest.approx(0.0)
     assert "robots: 2" in capsys.readouterr().out
 
 
