@@ -210,16 +210,20 @@ def test_a_file_that_was_there_at_the_start_is_no_record_however_it_is_declared_
 DECLARED = '[instrument.machine]\npreset = "testxpert"\n'
 
 
+def saved(folder, record=RECORD):
+    """Save a record and its sync file as declared; return the record's file."""
+    path = folder / "pull.TRA"
+    path.write_bytes(EXPORTS["testxpert"].write(record))
+    path.with_suffix(".sync.csv").write_text(SYNC)
+    return path
+
+
 @pytest.fixture
 def logging(watching):
     """A pull whose logger has written half of its record so far, and that record's file."""
     own, folder = watching(DECLARED)
     started(own, folder.parent / "raw")
-    path = folder / "pull.TRA"
-    half = {name: values[:25] for name, values in RECORD.items()}
-    path.write_bytes(EXPORTS["testxpert"].write(half))
-    path.with_suffix(".sync.csv").write_text(SYNC)
-    return own, path
+    return own, saved(folder, {name: values[:25] for name, values in RECORD.items()})
 
 
 def test_a_file_that_a_logger_writes_block_by_block_is_no_record_while_the_cross_head_moves(logging, said):
@@ -242,9 +246,7 @@ def test_a_record_that_was_complete_when_it_was_asked_for_is_taken_after_a_rest(
 
 def test_what_is_kept_is_what_was_read_even_if_its_file_is_gone(watching, said):
     own, folder = watching(DECLARED)
-    path = folder / "pull.TRA"
-    path.write_bytes(EXPORTS["testxpert"].write(RECORD))
-    path.with_suffix(".sync.csv").write_text(SYNC)
+    path = saved(folder)
     assert looked(own, seconds=PATIENCE_S), said
     content = path.read_bytes()
     path.unlink()
@@ -254,9 +256,7 @@ def test_what_is_kept_is_what_was_read_even_if_its_file_is_gone(watching, said):
 
 def test_a_record_that_went_on_after_it_was_read_is_not_kept(watching, said):
     own, folder = watching(DECLARED)
-    path = folder / "pull.TRA"
-    path.write_bytes(EXPORTS["testxpert"].write(RECORD))
-    path.with_suffix(".sync.csv").write_text(SYNC)
+    path = saved(folder)
     assert looked(own, seconds=PATIENCE_S), said
     path.write_bytes(path.read_bytes() + b"1;2;3\n")
     with pytest.raises(InstrumentFileError, match=r"pull\.TRA has changed since it was read"):
@@ -270,8 +270,6 @@ def test_a_file_that_cannot_be_read_is_reported(watching, said, monkeypatch):
 
     monkeypatch.setattr(own_instruments, "read_instrument", refuse)
     own, folder = watching(DECLARED)
-    path = folder / "pull.TRA"
-    path.write_bytes(EXPORTS["testxpert"].write(RECORD))
-    path.with_suffix(".sync.csv").write_text(SYNC)
+    saved(folder)
     assert looked(own, lambda: said)
     assert "pull.TRA cannot be read (Permission denied)" in said[0]
