@@ -128,6 +128,11 @@ class FunctionSystem(System):
             if p.at_least is not None:
                 fitted = [q.name for q in free]
                 _check_known(f"at_least of {p.name}", [p.at_least], fitted, "is no parameter that is fitted")
+                if (most := free[fitted.index(p.at_least)].upper) > p.upper:
+                    raise DeclarationError(
+                        f"{p.name} cannot fall below {p.at_least}, which may be {most:g}, beyond its own upper bound "
+                        f"{p.upper:g}: give both the same upper bound."
+                    )
         for effect in library:
             _check_known(f"apart of effect {effect.name}", effect.apart, [p.name for p in given], "is no parameter")
         ordered = {p.name for p in free if p.at_least} | {p.at_least for p in free}

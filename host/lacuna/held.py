@@ -60,5 +60,12 @@ class Held:
             if other not in able or other in self.tied:
                 free = ", ".join(n for n in able if n not in self.tied)
                 raise DeclarationError(f"{name} is tied to {other!r}, which is not one of {free}.")
+            its = able[other]
+            lower, upper = (self.fixed[other],) * 2 if other in self.fixed else (its.lower, its.upper)
+            if (lower < able[name].lower or upper > able[name].upper) and not able[name].periodic:
+                raise DeclarationError(
+                    f"{name} would follow {other} ({lower:g} to {upper:g}) beyond its own bounds, "
+                    f"{able[name].lower:g} to {able[name].upper:g}: give both the same."
+                )
         if not self.free(parameters):
             raise DeclarationError("Every parameter of the base model is fixed or tied: leave one to be fitted.")

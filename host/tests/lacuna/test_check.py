@@ -253,6 +253,9 @@ REFUSED_DECLARATIONS = {
     "parameter gain_K_W is declared 2 times": {"parameters": 2 * heater.PARAMETERS},
     "copy": {"parameters": replace(GAIN, name="copy")},
     "at_least of gain names 'kinetic', which is no parameter": {"parameters": replace(GAIN, at_least="kinetic")},
+    "gain cannot fall below slope, which may be 1e": {
+        "parameters": (replace(GAIN, at_least="slope"), Parameter("slope", "", 1.0, 0.0, 1e9)),
+    },
     "at_least of gain names 'by', which is no parameter that is fitted": {
         "parameters": (BEND, replace(GAIN, at_least="by")),
         "fixed": {"by": 0.2},
