@@ -11,8 +11,9 @@ from bifa.link import Uno
 from bifa.link.units import set_point_psi
 from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S, PRESSURES_OVER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, camera_rate, resampled
+from bifa.measure.motion import around_motion
 from bifa.measure.plan import EXTENDED, PULL_MM, SNAP_PSI, PlannedTrial
-from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Bench, Recording, idle, mount
+from bifa.measure.recording import LEAD_S, Bench, Recording, idle, mount
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.printable import counted
 from bifa.ranges import CHAMBERS, TICK_S
@@ -23,8 +24,6 @@ RELIEF_S = 12.0  # for a falling pressure: the regulator releases air more slowl
 
 # The second switch is 5 ms off the sampling grid of the first: together they are located to 5 ms instead of 10.
 STEP_UP_S, STEP_DOWN_S, STEP_END_S = 0.5, 5.005, 14.0
-MOVED_MM = 0.1  # displacement that counts as motion of the cross-head: well above its noise
-STILL_S = 1.0  # kept before and after the motion
 ATTEMPTS = 3  # at recording a trial without lost telemetry and with clocks that can be aligned
 
 SAMPLE_S = 0.01
@@ -94,7 +93,10 @@ def _record_motion(
         tape.wait(LEAD_S)
     held = "positive" if pressure_psi > 0.0 else "vacuum" if pressure_psi < 0.0 else "off"
     refuse_disturbed(tape.samples, "holding" if pressure_psi else "idle", {chamber: held})
-    return _machine_columns(tape, chamber, _moving_span(tape)), noted(tape.clock), tape.lost_samples
+    measured_psi = tape.pressures_psi[:, CHAMBERS.index(chamber)]
+    columns = around_motion(tape.instrument_s, tape.record, tape.pressures_s, measured_psi)
+    columns["time_s"] = columns["time_s"] - columns["time_s"][0]
+    return columns, noted(tape.clock), tape.lost_samples
 
 
 def _step(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
@@ -203,37 +205,6 @@ def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, flo
     low = max(uno_s[changes[0] - 1], uno_s[changes[1] - 1] - apart_s)
     high = min(uno_s[changes[0]], uno_s[changes[1]] - apart_s)
     return float(0.5 * (low + high)), float(0.5 * (high - low))
-
-
-def _moving_span(tape: Recording) -> slice:
-    """The part of the record around the motion that the Uno covers too, without most of the lead on both sides."""
-    time_s, place_mm = tape.instrument_s, tape.record["displacement_mm"]
-    begin_s = max(time_s[0] + BEFORE_MARK_S + 0.8 * LEAD_S, tape.pressures_s[0])
-    end_s = min(time_s[-1] - 0.5 * LEAD_S, tape.pressures_s[-1])
-    inside = (time_s >= begin_s) & (time_s <= end_s)
-    if not inside.any():
-        raise BifaError("the instrument's record and the Uno's do not overlap in time: repeat")
-    moved = time_s[inside & (np.abs(place_mm - place_mm[inside][0]) > MOVED_MM)]
-    if not len(moved):
-        raise BifaError("the cross-head did not move while the Uno recorded: repeat")
-    inside &= (time_s >= moved[0] - STILL_S) & (time_s <= moved[-1] + STILL_S)
-    kept = np.flatnonzero(inside)
-    return slice(kept[0], kept[-1] + 1)
-
-
-def _machine_columns(tape: Recording, chamber: str, span: slice) -> dict[str, np.ndarray]:
-    """Columns of a testing machine's record, with the pressure at the machine's own times."""
-    time_s = tape.instrument_s[span]
-    pressure = tape.pressures_psi[:, CHAMBERS.index(chamber)]
-    sampled_s = tape.pressures_s
-    nearest = np.clip(np.searchsorted(sampled_s, time_s), 1, len(sampled_s) - 1)
-    nearest -= time_s - sampled_s[nearest - 1] < sampled_s[nearest] - time_s
-    return {
-        "time_s": time_s - time_s[0],
-        "displacement_mm": tape.record["displacement_mm"][span],
-        "force_N": tape.record["force_N"][span],
-        "pressure_psi": pressure[nearest],
-    }
 
 
 def _walk_columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np.ndarray]:

@@ -20,6 +20,7 @@ from bifa.data.layout import TABLE_FILE
 from bifa.data.lost import codes
 from bifa.data.sheet import Sheet
 from bifa.data.write import add_trial
+from bifa.errors import BifaError
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import (
     LONGEST_GAP_S,
@@ -32,13 +33,12 @@ from bifa.measure.alignment import (
 )
 from bifa.measure.experiments import CHAMBER_OF, noted, set_point
 from bifa.measure.instruments import CHANNELS
+from bifa.measure.motion import around_motion
 from bifa.measure.plan import PlannedTrial
 from bifa.ranges import CHAMBERS
 
 Columns = Mapping[str, np.ndarray]
 
-_MARGIN_S = 0.25
-_MOVED_MM = 0.05
 _MAX_PLAUSIBLE = 500.0  # mm or N, more than any actuator reaches: 999 in a small unit may be a real measurement
 _HEAD, _TAIL = "displacement_head_mm", "displacement_tail_mm"
 _REPAIR = "(a lost marker?); fill the gap with the instrument's own software, or record again"
@@ -219,32 +219,19 @@ def _marked(strobe: np.ndarray, sequence: np.ndarray, telemetry: Path) -> int:
 
 def _assemble(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
     """Columns of the trial, from two records that are both on the Uno's clock."""
-    overlap = (measured["time_s"] >= uno["time_s"][0]) & (measured["time_s"] <= uno["time_s"][-1])
-    if overlap.sum() < 3:
-        raise InstrumentFileError(f"{instrument} and the telemetry do not overlap in time")
     if planned.experiment in ("static_loading", "anchor_pull"):
-        return _machine(measured, overlap, uno, planned, instrument)
+        return _machine(measured, uno, planned, instrument)
     return _camera(measured, uno, planned, instrument)
 
 
-def _machine(
-    measured: Columns, overlap: np.ndarray, uno: Columns, planned: PlannedTrial, instrument: Path
-) -> dict[str, np.ndarray]:
-    instrument_s = measured["time_s"]
-    moved = overlap & (np.abs(measured["displacement_mm"] - measured["displacement_mm"][overlap][0]) > _MOVED_MM)
-    if not moved.any():
-        raise InstrumentFileError(f"{instrument}: nothing moved while the Uno recorded")
-    first, last = instrument_s[moved][0] - _MARGIN_S, instrument_s[moved][-1] + _MARGIN_S
-    keep = overlap & (instrument_s >= first) & (instrument_s <= last)
+def _machine(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
     chamber = CHAMBER_OF.get(planned.actuator or "", "head")  # a pull has no actuator: it tests the head
-    time_s = instrument_s[keep]
-    _refuse_silence(uno["time_s"], time_s)
-    return {
-        "time_s": time_s - time_s[0],
-        "displacement_mm": measured["displacement_mm"][keep],
-        "force_N": measured["force_N"][keep],
-        "pressure_psi": np.interp(time_s, uno["time_s"], uno[f"pressure_{chamber}_psi"]),
-    }
+    try:
+        columns = around_motion(measured["time_s"], measured, uno["time_s"], uno[f"pressure_{chamber}_psi"])
+    except BifaError as error:
+        raise InstrumentFileError(f"{instrument}: {error}") from None
+    _refuse_silence(uno["time_s"], columns["time_s"])
+    return columns | {"time_s": columns["time_s"] - columns["time_s"][0]}
 
 
 def _camera(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
