@@ -27,7 +27,7 @@ help:
 	echo "make wheels   build sdists and wheels of the three packages in dist/"
 	echo "make setup    set up only: Debian packages, .venv, PlatformIO's packages, compiled parts, firmware"
 	echo "make lock     resolve host/requirements.in into host/requirements.lock"
-	echo "make clean    remove build products; make distclean also removes .venv and .platformio"
+	echo "make clean    remove build products; make distclean also removes .venv, .platformio and bench.json"
 
 .PHONY: demo test bench soak mutation portability blind notebooks
 demo: setup

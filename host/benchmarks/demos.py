@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from benchmarks import records as lines
 from benchmarks.blind_figures import wilson
-from benchmarks.search_record import claim
+from benchmarks.search_record import version
 from bifa.campaign.again import fastest_at_edge
 
 SEEDS, FIRST_SEED, JOBS, OUT = 10, 1000, 2, Path("../out/demos")
@@ -48,7 +48,7 @@ class Story(NamedTuple):
 
 def told(seed: int, out: Path) -> Story:
     """Run the demo, or resume it."""
-    folder = out / str(seed)
+    folder = out / version() / str(seed)  # another version would take its finished stages for its own
     folder.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "bifa", "demo", "--seed", str(seed), "--out", str(folder / "demo")]
     with (folder / "printed.txt").open("w") as printed:
@@ -96,7 +96,6 @@ def summed_up(stories: Sequence[Story]) -> dict[str, float]:
 
 def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) -> dict[str, float]:
     """Print the table, a line as each demo ends; return the figures flat."""
-    claim(out)
     known = lines.read(kept, "seed")
     print(HEADING)
     stories = []

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import records as lines
-from benchmarks.search_record import claim, version
+from benchmarks.search_record import version
 from bifa.campaign.again import fastest_at_edge, read_rounds
 from bifa.campaign.loop import campaign, found_gait
 from bifa.campaign.setup import Effort, Setup
@@ -82,7 +82,8 @@ class Gain:
 
 def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) -> Gain:
     """Run or resume the campaign on the robot with `effect` at its full size, and walk its gaits."""
-    setup, folder = robot(effect, seed), out / f"{effect}-{seed}"
+    # By version, whose finished stages another would take for its own.
+    setup, folder = robot(effect, seed), out / version() / f"{effect}-{seed}"
     stages = campaign(setup, effort or Effort(), lambda what, share: None)
     run_stages(folder, stages, on_start=_begun)
     summary = json.loads((folder / "summary.json").read_text())
@@ -212,7 +213,7 @@ def _against(gains: Sequence[Gain]) -> dict[str, float]:
         return {}
     speed = [{name: mean(gait.runs_mm_s) for name, gait in gaits.items()} for gaits in pairs]
     gain = mean(one["edge"] for one in speed) / mean(one["robust"] for one in speed) - 1.0
-    ahead = min(one["edge"] / max(one["naive"], one["fair"]) - 1.0 for one in speed)
+    ahead = min(one["edge"] / max(one["naive"], one["fair"], 1e-9) - 1.0 for one in speed)
     errors = [mean(gaits["edge"].runs_mm_s) / gaits["edge"].predicted_mm_s - 1.0 for gaits in pairs]
     print(f"speed walked at the edge against the predicted one: {100 * median(errors):+.2f} % (median)")
     print(f"edge against the robust gait: {100 * gain:+.1f} % on average")
@@ -250,7 +251,6 @@ def plot(gains: Sequence[Gain], file: Path) -> None:
 def run(effects: Sequence[str], seeds: Sequence[int], out: Path, kept: Path | None = None) -> dict[str, float]:
     """Print the table, a line as each campaign ends; return the figures flat. Ctrl-C ends with a summary of those done.
     `kept`: the file of records."""
-    claim(out)
     known = lines.read(kept, "effect", "seed")
     print(HEADING)
     gains = []

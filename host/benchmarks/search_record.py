@@ -65,17 +65,6 @@ def write_losses(path: Path, record: dict) -> None:
     lines.write(losses_beside(path), known.values())
 
 
-def claim(out: Path) -> None:
-    """Mark a folder of campaigns as this version's. Raises SystemExit if it is another's, whose finished stages would
-    pass for this version's."""
-    mark = out / "engine.txt"
-    out.mkdir(parents=True, exist_ok=True)
-    if not mark.exists():
-        mark.write_text(f"{version()}\n", encoding="utf-8")
-    elif (other := mark.read_text(encoding="utf-8").strip()) != version():
-        raise SystemExit(f"{out} has campaigns of version {other}, this is {version()}: give another --out")
-
-
 @cache
 def version() -> str:
     """The commit of this checkout, marked if there are changes; for an installed engine, its version."""

@@ -60,12 +60,12 @@ class Held:
             if other not in able or other in self.tied:
                 free = ", ".join(n for n in able if n not in self.tied)
                 raise DeclarationError(f"{name} is tied to {other!r}, which is not one of {free}.")
-            its = able[other]
-            lower, upper = (self.fixed[other],) * 2 if other in self.fixed else (its.lower, its.upper)
-            if (lower < able[name].lower or upper > able[name].upper) and not able[name].periodic:
+            own, its = able[name], able[other]
+            ends = (self.fixed[other],) if other in self.fixed else (its.lower, its.upper)
+            if not (own.periodic or own.lower <= ends[0] <= ends[-1] <= own.upper):
+                what = f"fixed at {ends[0]:g}" if other in self.fixed else f"{its.lower:g} to {its.upper:g}"
                 raise DeclarationError(
-                    f"{name} would follow {other} ({lower:g} to {upper:g}) beyond its own bounds, "
-                    f"{able[name].lower:g} to {able[name].upper:g}: give both the same."
+                    f"{name} would follow {other} ({what}) beyond its own bounds, {own.lower:g} to {own.upper:g}."
                 )
         if not self.free(parameters):
             raise DeclarationError("Every parameter of the base model is fixed or tied: leave one to be fitted.")

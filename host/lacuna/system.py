@@ -39,7 +39,8 @@ class Parameter:
     `prior_sd` is the standard
     deviation of the parameter's prior around `value`; None: no prior.
 
-    `at_least`: for a parameter of the base model, the name of another one that it cannot fall below. `elsewhere`:
+    `at_least`: for a parameter of the base model, the name of another one that it cannot fall below, and whose upper
+    bound must not be above its own. `elsewhere`:
     further initial values of graduated fits, for a parameter whose isolating trials fit equally well at several values.
     `factor_of`: for a nuisance, the parameters that it multiplies in its trial; its derivatives are then computed from
     theirs, so that the data do not falsely seem to distinguish a change of all trials' factors from a change of the

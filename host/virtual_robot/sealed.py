@@ -112,7 +112,7 @@ def generate(
 ) -> Label:
     """Write the data set `out` and its label, which is complete before the data set appears.
 
-    `effect` and `size` (a factor of its modest size) replace what would be drawn. Raises SealedError if `out`
+    `effect` and `size` (a factor of its modest size) replace what would be drawn. Raises VirtualRobotError if `out`
     exists, or if the kind or effect is unknown.
     """
     out = Path(out)

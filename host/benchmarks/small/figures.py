@@ -76,7 +76,7 @@ def report(records: Sequence[dict]) -> None:
         hits = [right(r, said) for r, said in saying]
         print(_row(peer, [r for r, _ in asked], hits, [p for _, p in asked]))
         steady += [_steady_share(peer, [r for r, _ in saying], hits)] if hits else []
-    print("right where nothing drifts, since only the engine is told of a drift", *steady, sep="\n")
+    print("right where nothing drifts", *steady, sep="\n")
     print("\nby kind of system: one effect named first, no effect `none`, both of two named")
     for system in dict.fromkeys(r["system"] for r in records):
         found = list(rates([r for r in records if r["system"] == system]).values())

@@ -82,7 +82,7 @@ def campaign(
     from bifa.campaign.stages import check_folder
     from bifa.rig import check_port, is_offered
 
-    check_targets(None if is_offered(port) else bench, folders=(out,))
+    check_targets(None if is_offered(port) or bench.exists() else bench, folders=(out,))
     check_folder(out)
     check_port(port)
     if port != "virtual":

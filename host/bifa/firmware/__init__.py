@@ -40,7 +40,7 @@ def carried_path() -> Path | None:
 
 
 def carried_image(folder: Path = FOLDER) -> Path:
-    """Return the path of the package's image after checking that it is undamaged and has this host's tables."""
+    """Return the path of the package's image after checking that it is undamaged and of this host's version."""
     try:
         noted = _noted(folder / HEAD)
         found = image_of(folder / HEX)
@@ -50,14 +50,14 @@ def carried_image(folder: Path = FOLDER) -> Path:
         ) from error
     if found != noted:
         raise ImageError(f"{folder / HEX} is damaged: reinstall the wheel of bifa")
-    _check_tables(found, folder / HEX)
+    _check_version(found, folder / HEX)
     return folder / HEX
 
 
 def write_image(built: Path, folder: Path = FOLDER) -> Image:
-    """Copy a built image into the package if it has this host's tables."""
+    """Copy a built image into the package if it is of this host's version."""
     image = image_of(built)
-    _check_tables(image, built)
+    _check_version(image, built)
     shutil.copyfile(built, folder / HEX)
     (folder / HEAD).write_text(tomli_w.dumps(asdict(image)), "utf-8")
     return image
@@ -80,7 +80,7 @@ def _noted(path: Path) -> Image:
         raise ImageError(f"{path} is damaged: reinstall the wheel of bifa") from error
 
 
-def _check_tables(image: Image, path: Path) -> None:
+def _check_version(image: Image, path: Path) -> None:
     ours = (__version__, PROTOCOL_VERSION, f"{TABLE_HASH:08x}")
     if (image.version, image.protocol, image.table) != ours:
         raise ImageError(

@@ -13,7 +13,7 @@ from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S, PRESSURES_OVER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, camera_rate, resampled
 from bifa.measure.motion import around_motion
 from bifa.measure.plan import EXTENDED, PULL_MM, SNAP_PSI, PlannedTrial
-from bifa.measure.recording import LEAD_S, Bench, Recording, idle, mount
+from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Bench, Recording, idle, mount
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.printable import counted
 from bifa.ranges import CHAMBERS, TICK_S
@@ -24,6 +24,7 @@ RELIEF_S = 12.0  # for a falling pressure: the regulator releases air more slowl
 
 # The second switch is 5 ms off the sampling grid of the first: together they are located to 5 ms instead of 10.
 STEP_UP_S, STEP_DOWN_S, STEP_END_S = 0.5, 5.005, 14.0
+_LEAD_S = (BEFORE_MARK_S + 0.8 * LEAD_S, 0.5 * LEAD_S)  # left out of a record of a motion, before and after
 ATTEMPTS = 3  # at recording a trial without lost telemetry and with clocks that can be aligned
 
 SAMPLE_S = 0.01
@@ -94,7 +95,7 @@ def _record_motion(
     held = "positive" if pressure_psi > 0.0 else "vacuum" if pressure_psi < 0.0 else "off"
     refuse_disturbed(tape.samples, "holding" if pressure_psi else "idle", {chamber: held})
     measured_psi = tape.pressures_psi[:, CHAMBERS.index(chamber)]
-    columns = around_motion(tape.instrument_s, tape.record, tape.pressures_s, measured_psi)
+    columns = around_motion(tape.instrument_s, tape.record, tape.pressures_s, measured_psi, _LEAD_S)
     columns["time_s"] = columns["time_s"] - columns["time_s"][0]
     return columns, noted(tape.clock), tape.lost_samples
 

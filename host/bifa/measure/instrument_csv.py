@@ -247,8 +247,8 @@ def _camera(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: 
     time_s = uno["time_s"][keep]
     if (np.diff(np.flatnonzero(keep)) > 1).any() and np.diff(time_s).max() > LONGEST_GAP_S:
         raise InstrumentFileError(
-            f"the telemetry has several times in which the valves were commanded, {np.diff(time_s).max():.1f} s apart; "
-            "give a file that has one"
+            f"the telemetry contains several runs of valve commands, {np.diff(time_s).max():.1f} s apart; give a file "
+            "with one"
         )
     _refuse_silence(uno["time_s"], time_s)
     columns = {"time_s": time_s - time_s[0]}

@@ -52,7 +52,11 @@ class _Record:
         for path, content in self.content.items():
             with contextlib.suppress(OSError):
                 if path.read_bytes() != content:
-                    raise InstrumentFileError(f"{path} has changed since it was read, as while a recording goes on")
+                    raise InstrumentFileError(f"{path} has changed since it was read, as if still being recorded")
+
+
+class _LockedError(InstrumentFileError):
+    """A file cannot be read at present."""
 
 
 class OwnInstruments:
@@ -66,7 +70,7 @@ class OwnInstruments:
         self.attend, self.tell = desk.attend, desk.count_down
         self._declared: Mapping[str, Export] = {}
         self._before: dict[Path, Signature] = {}
-        self._wrong = ""
+        self._wrong = self._locked = ""
         self._reported: dict[Path, Signature] = {}
         self._turn: Turn  # this and `_kept` are set by `begin`
         self._kept: Path
@@ -74,7 +78,7 @@ class OwnInstruments:
         self._experiment = ""
         self._known: dict[Path, Signature] = {}
         self._seen: dict[Path, tuple[Signature, float]] = {}
-        self._begun: dict[Path, Signature] = {}
+        self._begun: set[Signature] = set()
         self._record: _Record | None = None
         self._reader = futures.ThreadPoolExecutor(1, thread_name_prefix="bifa-record")
         self._reading: futures.Future[_Record] | None = None
@@ -99,7 +103,8 @@ class OwnInstruments:
     def start(self) -> None:
         """See Instruments."""
         self._before = dict(_signatures_of(self._files()))
-        self._known, self._begun, self._reported = {}, {}, dict(self._before)
+        self._known, self._begun = {}, set()
+        self._reported = {path: (signature,) for path, signature in self._before.items()}
         machine = ROLES[self._experiment] == MACHINE  # a testing machine, which moves and measures, not a camera
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
         self._ask(
@@ -141,7 +146,7 @@ class OwnInstruments:
 
     def save(self) -> None:
         """See AskedInstruments."""
-        self._begun = dict(_signatures_of(self._files()))
+        self._begun = {signature for _, signature in _signatures_of(self._files())}
         where, then = (
             (f"to {self._watch} ", "") if self._watch is not None else ("", ", then type the path of the first")
         )
@@ -209,7 +214,8 @@ class OwnInstruments:
         """Files that are not, or not yet, part of a complete record."""
         whole = {path for path, _ in self._signatures()}
         whole |= {sync_file(path) for path in whole}
-        return _signatures_of(path for path in self._files() if path not in whole)
+        for path, signature in _signatures_of(path for path in self._files() if path not in whole):
+            yield path, (signature,)
 
     @property
     def _suffixes(self) -> tuple[str, ...]:
@@ -231,8 +237,7 @@ class OwnInstruments:
         if before != signature:
             self._seen[path] = (signature, time.monotonic())
             return False
-        is_as_begun = signature[0] == self._begun.get(path)
-        return time.monotonic() - since_s >= (RESTED_S if is_as_begun else SETTLED_S)
+        return time.monotonic() - since_s >= (RESTED_S if self._begun & {*signature} else SETTLED_S)
 
     def _explain_unusable(self, path: Path) -> str:
         if _is_sync(path):
@@ -292,9 +297,9 @@ class OwnInstruments:
             columns, edges = read_instrument(path, CHANNELS[self._experiment], self._export)
             record = _Record({**columns, "sync_time_s": edges}, content)
             record.refuse_changed()
-            self._refuse_earlier(path, content[path])
-        except OSError as error:
-            raise InstrumentFileError(f"{error.filename} cannot be read ({error.strerror})") from None
+            self._refuse_earlier(path)
+        except OSError as error:  # locked by the program that writes it, say
+            raise _LockedError(f"cannot be read ({error.strerror})", file=str(path)) from None
         return record
 
     def _poll_reading(self) -> bool:
@@ -304,6 +309,13 @@ class OwnInstruments:
             self._record = self._reading.result(_READ_S)
         except futures.TimeoutError:
             return False
+        except _LockedError as error:
+            self._reading = None
+            self._known.pop(Path(str(error.file)), None)  # it is tried again
+            if str(error) != self._locked:
+                self._locked = str(error)
+                self._desk.say(f"{error}; it is tried again: close it in other programs.")
+            return False
         except DatasetError as error:
             self._reading = None
             self._desk.say(f"{error}. Correct it and save it again.")
@@ -311,9 +323,9 @@ class OwnInstruments:
         self._reading, self._step = None, "saved"
         return True
 
-    def _refuse_earlier(self, path: Path, data: bytes) -> None:
+    def _refuse_earlier(self, path: Path) -> None:
         """Refuse the file of an earlier trial, which was saved or named by mistake."""
-        own = Path(self._turn.planned.file).stem
+        data, own = path.read_bytes(), Path(self._turn.planned.file).stem
         for old in sorted(self._kept.glob("*")):
             if old.stem != own and not _is_sync(old) and old.is_file() and old.read_bytes() == data:
                 raise InstrumentFileError(f"{path} is the record of an earlier trial, {old.name}")

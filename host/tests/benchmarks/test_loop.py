@@ -57,6 +57,13 @@ def test_means_over_robots(capsys):
     assert "robots: 2" in capsys.readouterr().out
 
 
+def test_the_edge_is_compared_with_the_better_of_the_base_models_gaits_on_every_robot():
+    still = gait(23.0, (0.0, 0.0, 0.0))
+    gains = [robot(edge=gait(23.46)), robot(edge=gait(21.42), naive=gait(20.0)), robot(naive=still, fair=still)]
+    assert loop.summed_up(gains)["loop_edge_worst_ahead_of_base"] == pytest.approx(0.02)
+    assert loop.summed_up([robot(edge=gait(22.77))])["loop_edge_worst_ahead_of_base"] == pytest.approx(-0.01)
+
+
 def test_coverage_over_first_gaits_is_shown_beside_that_of_the_gaits_handed_over(capsys):
     gains = [replace(robot(), edge_inside=inside) for inside in ((True,), (False, True), ())]
     figures = loop.summed_up(gains)

@@ -69,7 +69,7 @@ def test_a_diagnosis_names_the_same_and_tells_of_what_it_held():
         ({"tied": {"tau_s": "tau_s"}}, "tau_s is tied to 'tau_s'"),
         ({"tied": {"tau_s": "gain_K_W"}, "fixed": {"tau_s": 1.0}}, "both fixed and tied"),
         ({"tied": {"spread.at_W": "tau_s"}}, r"at_W would follow tau_s \(.* beyond its own bounds, 1 to 20"),
-        ({"tied": {"spread.at_W": "tau_s"}, "fixed": {"tau_s": 25.0}}, r"tau_s \(25 to 25\) beyond"),
+        ({"tied": {"spread.at_W": "tau_s"}, "fixed": {"tau_s": 25.0}}, r"tau_s \(fixed at 25\) beyond"),
         ({"fixed": {"tau_s": 15.0, "gain_K_W": 1.0, "tau_other_s": 1.0}}, "leave one to be fitted"),
     ],
 )

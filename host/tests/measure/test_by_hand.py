@@ -172,6 +172,24 @@ def test_a_file_that_cannot_be_read_is_named_and_waited_for_again(bench, tmp_pat
     assert "lacks the column force_N; it has time_s, displacement_mm, Load (N)" in "\n".join(here.said)
 
 
+def test_a_record_that_went_on_after_it_was_read_leads_to_another_try(bench, tmp_path):
+    here = bench()
+    reviewed = []
+
+    def go_on_at_first(asked):
+        reviewed.append(asked["step"])
+        if len(reviewed) == 1:
+            path = here.watch / asked["file"]
+            path.write_text(path.read_text() + "1000.0,0.0,0.0\n")
+        return ""
+
+    here.lab.review = go_on_at_first
+    dataset = here.run(tmp_path / "day", (STATIC,))
+    assert "has changed since it was read" in "\n".join(here.said)
+    assert len(reviewed) == 3, "kept, tried again, kept"
+    assert [trial.file for trial in dataset.trials] == [STATIC.file]
+
+
 def test_clocks_that_cannot_be_lined_up_lead_to_another_try_and_nothing_is_kept_of_the_first(bench, tmp_path):
     deaf, saved = at_first(lambda record: {"sync_time_s": record["sync_time_s"][40:]})
     here = bench(spoil=deaf)

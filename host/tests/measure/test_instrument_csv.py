@@ -62,6 +62,24 @@ def write(path, columns):
     path.write_text(",".join(columns) + "\n" + "".join(",".join(f"{v:.6f}" for v in row) + "\n" for row in rows))
 
 
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_a_record_that_begins_and_ends_with_the_motion_is_kept_whole(files):
+    header, *rows = (files / "pull.csv").read_text().splitlines()
+    moving = [row for row in rows if own(3.9) <= float(row.split(",")[0]) <= own(5.99)]
+    (files / "pull.csv").write_text("\n".join([header, *moving, ""]))
+    (trial,) = import_trial(files / "pull.csv", files, PULL, files / "out")[0].trials
+    assert len(trial.time_s) == len(moving)
+    assert np.ptp(trial.columns["displacement_mm"]) == pytest.approx(39.6, abs=0.5)
+
+
+def test_a_cross_head_that_never_moved_is_named(files):
+    header, *rows = (files / "pull.csv").read_text().splitlines()
+    still = [f"{row.split(',')[0]},0.0,0.0" for row in rows]
+    (files / "pull.csv").write_text("\n".join([header, *still, ""]))
+    with pytest.raises(DatasetError, match=r"pull\.csv: the cross-head did not move while the Uno recorded"):
+        import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
 def test_the_two_records_are_brought_onto_one_clock(files):
     dataset, clock = import_trial(files / "pull.csv", files, PULL, files / "out")
     (trial,) = dataset.trials
@@ -169,7 +187,7 @@ def test_a_walk_that_was_filmed_from_its_middle_on_is_refused(files):
 
 @pytest.mark.parametrize("files", ["marked"], indirect=True)
 def test_two_walks_of_one_telemetry_are_not_joined(files):
-    with pytest.raises(DatasetError, match=r"the telemetry has several times .* commanded, 2\.0 s apart"):
+    with pytest.raises(DatasetError, match=r"the telemetry contains several runs of .*, 2\.0 s apart"):
         walked(files, (2.0, 4.0), (6.0, np.inf))(1.5)
 
 

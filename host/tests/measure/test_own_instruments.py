@@ -264,12 +264,27 @@ def test_a_record_that_went_on_after_it_was_read_is_not_kept(watching, said):
     assert not (folder.parent / "raw").exists()
 
 
-def test_a_file_that_cannot_be_read_is_reported(watching, said, monkeypatch):
+def test_a_file_that_another_program_has_locked_is_reported_once_and_read_when_it_is_free(watching, said, monkeypatch):
     def refuse(*_):
-        raise PermissionError(13, "Permission denied", "pull.TRA")
+        raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(own_instruments, "read_instrument", refuse)
     own, folder = watching(DECLARED)
-    saved(folder)
-    assert looked(own, lambda: said)
-    assert "pull.TRA cannot be read (Permission denied)" in said[0]
+    with monkeypatch.context() as locked:
+        locked.setattr(own_instruments, "read_instrument", refuse)
+        saved(folder)
+        assert looked(own, lambda: said)
+        assert not looked(own, lambda: len(said) > 1, 1.5)
+    assert "pull.TRA: cannot be read (Permission denied)" in said[0]
+    assert looked(own, seconds=PATIENCE_S), said
+
+
+def test_a_sync_file_that_is_being_written_is_waited_for_as_well(watching, said):
+    own, folder = watching(DECLARED)
+    started(own, folder.parent / "raw")
+    (folder / "pull.sync.csv").write_text(SYNC[: len(SYNC) // 2] + "\n")
+    own.save()
+    (folder / "pull.TRA").write_bytes(EXPORTS["testxpert"].write(RECORD))
+    assert not looked(own, seconds=1.5), "taken with half of its edges"
+    (folder / "pull.sync.csv").write_text(SYNC)
+    assert looked(own, seconds=PATIENCE_S), said
+    assert len(own.stop()["sync_time_s"]) == 100
