@@ -2,9 +2,9 @@
 
     python -m benchmarks.cliff [--out ../out/loop] [--records FILE] [--print]
 
-For every campaign that `benchmarks.loop` has left in OUT, the last gait is made faster until, by the last model, nearly
-all, most, half and few of the possible robots walk with it. Each such gait is walked `RUNS` times, through the real
-firmware. FILE has one line per robot, with which an interrupted run resumes.
+For every campaign that `benchmarks.loop` of this version has left in OUT, the last gait is made faster until, by the
+last model, nearly all, most, half and few of the possible robots walk with it. Each such gait is walked `RUNS` times,
+through the real firmware. FILE has one line per robot, with which an interrupted run resumes.
 """
 
 import argparse
@@ -20,6 +20,7 @@ import numpy as np
 
 from benchmarks import loop
 from benchmarks import records as lines
+from benchmarks.search_record import version
 from bifa.campaign.walks import measure_walks, speed_of
 from bifa.gait.prediction import MIN_SPEED_RATIO, Prediction, Predictor
 from bifa.gait.settling import STANDING_MM_S
@@ -128,7 +129,7 @@ def run(out: Path, kept: Path | None = None, only_print: bool = False) -> dict[s
     """Print the table, one line per robot; return the figures flat."""
     known = lines.read(kept, "robot")
     if not only_print:
-        for rounds in sorted(out.glob("*/rounds.json")):
+        for rounds in sorted((out / version()).glob("*/rounds.json")):
             name = rounds.parent.name
             if name not in known:
                 effect, _, seed = name.rpartition("-")
