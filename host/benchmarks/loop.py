@@ -3,7 +3,7 @@
     python -m benchmarks.loop [--effects hysteresis,leak] [--seeds 3] [--first-seed 200] [--out ../out/loop]
                               [--records FILE] [--print] [--plot PNG]
 
-For each effect of the library at its full size and each seed, runs a whole campaign through the real firmware, profile
+For each effect of the library at its modest size and each seed, runs a whole campaign through the real firmware, profile
 `realistic`, as `bifa campaign` does, with another specimen of the robot and other noise. Five gaits are walked: the
 paper's baseline; with the base model, at the edge of its fit's covariance alone (naive, what people do) and at the edge
 of all that is known of it (fair: its remainder is large, and so is its margin); with the completed model, robust
@@ -81,7 +81,7 @@ class Gain:
 
 
 def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) -> Gain:
-    """Run or resume the campaign on the robot with `effect` at its full size, and walk its gaits."""
+    """Run or resume the campaign on the robot with `effect` at its modest size, and walk its gaits."""
     # By version, whose finished stages another would take for its own.
     setup, folder = robot(effect, seed), out / version() / f"{effect}-{seed}"
     stages = campaign(setup, effort or Effort(), lambda what, share: None)
@@ -95,7 +95,7 @@ def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) ->
 
 
 def robot(effect: str, seed: int) -> Setup:
-    """The setup of a specimen with `effect` at its full size."""
+    """The setup of a specimen with `effect` at its modest size."""
     values = EFFECTS[effect].at(1.0, np.random.default_rng([seed, 0x100]))
     return Setup(
         "virtual",
