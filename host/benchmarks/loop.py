@@ -3,10 +3,10 @@
     python -m benchmarks.loop [--effects hysteresis,leak] [--seeds 3] [--first-seed 200] [--out ../out/loop]
                               [--records FILE] [--print] [--plot PNG]
 
-For each effect of the library at its modest size and each seed, runs a whole campaign through the real firmware, profile
-`realistic`, as `bifa campaign` does, with another specimen of the robot and other noise. Five gaits are walked: the
-paper's baseline; with the base model, at the edge of its fit's covariance alone (naive, what people do) and at the edge
-of all that is known of it (fair: its remainder is large, and so is its margin); with the completed model, robust
+For each effect of the library at its modest size and each seed, runs a whole campaign through the real firmware,
+profile `realistic`, as `bifa campaign` does, with another specimen of the robot and other noise. Five gaits are walked:
+the paper's baseline; with the base model, at the edge of its fit's covariance alone (naive, what people do) and at the
+edge of all that is known of it (fair: its remainder is large, and so is its margin); with the completed model, robust
 against 2 % (what campaigns used to do) and at the edge, the gait that the campaign hands over. For each, the model that
 it was sought with predicts an interval and the probability of walking. Campaigns stay in OUT, by version, so that an
 interrupted run resumes; FILE has one line for each, with which it resumes on another machine. A run "walks" if it

@@ -36,7 +36,8 @@ def remembered(core_dir: Path) -> Decision | None:
 
 
 def fingerprint(core_dir: Path) -> str:
-    """Return a hash of the sources of this folder and of the stand-ins, the versions of PlatformIO and SCons, and the places linked to."""
+    """Return a hash of the sources of this folder and of the stand-ins, the versions of PlatformIO and SCons, and the
+    places linked to."""
     sha = hashlib.sha256()
     for word in (platformio.__version__, SCons.__version__, SCons.__file__, sys.prefix, str(core_dir.resolve())):
         sha.update(word.encode() + b"\0")
