@@ -103,7 +103,7 @@ class OwnInstruments:
     def start(self) -> None:
         """See Instruments."""
         self._before = dict(_signatures_of(self._files()))
-        self._known, self._begun = {}, set()
+        self._known, self._begun, self._locked = {}, set(), ""
         self._reported = {path: (signature,) for path, signature in self._before.items()}
         machine = ROLES[self._experiment] == MACHINE  # a testing machine, which moves and measures, not a camera
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
@@ -312,9 +312,11 @@ class OwnInstruments:
         except _LockedError as error:
             self._reading = None
             self._known.pop(Path(str(error.file)), None)  # it is tried again
-            if str(error) != self._locked:
+            if self._watch is None:
+                self._desk.say(f"{error}. Close it in other programs, and type its path again.")
+            elif str(error) != self._locked:
                 self._locked = str(error)
-                self._desk.say(f"{error}; it is tried again: close it in other programs.")
+                self._desk.say(f"{error}. Close it in other programs; it is tried again.")
             return False
         except DatasetError as error:
             self._reading = None

@@ -278,6 +278,18 @@ def test_a_file_that_another_program_has_locked_is_reported_once_and_read_when_i
     assert looked(own, seconds=PATIENCE_S), said
 
 
+def test_a_locked_file_whose_path_was_typed_has_to_be_typed_again(said, tmp_path, monkeypatch):
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    path = saved(tmp_path)
+    typing = Typing(said.append, str(path))
+    own = recorded(OwnInstruments(typing), tmp_path / "raw")
+    with monkeypatch.context() as locked:
+        locked.setattr(own_instruments, "read_instrument", refuse)
+        assert until(lambda: not own.ready and "type its path again" in said[-1])
+
+
 def test_a_sync_file_that_is_being_written_is_waited_for_as_well(watching, said):
     own, folder = watching(DECLARED)
     started(own, folder.parent / "raw")
