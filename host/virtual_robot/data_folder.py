@@ -16,7 +16,7 @@ from virtual_robot.errors import VirtualRobotError
 _LARGEST = 10.0  # times the modest size: beyond it some robots cannot be simulated
 
 
-def check_numbers(seed: int, size: float | None) -> None:
+def check_numbers(seed: int, size: float | None = None) -> None:
     """Raise VirtualRobotError if the seed, or the factor of an effect's modest size, is out of range."""
     if seed < 0:
         raise VirtualRobotError(f"seed = {seed} must not be negative")

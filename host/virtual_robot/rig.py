@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from virtual_robot.data_folder import check_numbers
 from virtual_robot.effects import plant_parameters
 from virtual_robot.errors import FirmwareError, PortClosedError, VirtualRobotError
 from virtual_robot.instruments import Instruments, Noise
@@ -201,8 +202,8 @@ def open_rig(
     `eeprom`: a file that keeps the EEPROM's contents. `parameters`: plant parameters to replace.
     Raises VirtualRobotError, saying what to do.
     """
-    if seed < 0 or (sealed or 0) < 0:
-        raise VirtualRobotError(f"seed = {seed} and sealed = {sealed} must not be negative")
+    for given in (seed, sealed or 0):
+        check_numbers(given)
     if sealed_kind not in KINDS:
         raise VirtualRobotError(f"sealed_kind {sealed_kind!r} is not one of {', '.join(KINDS)}")
     numbers, curves, inside = parameters_in(profile), None, dict(effects or {})

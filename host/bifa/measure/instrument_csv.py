@@ -245,10 +245,10 @@ def _camera(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: 
     if not keep.any():
         raise InstrumentFileError(f"{instrument} does not cover the time in which the valves were commanded")
     time_s = uno["time_s"][keep]
-    if (np.diff(np.flatnonzero(keep)) > 1).any() and np.diff(time_s).max() > LONGEST_GAP_S:
+    apart_s = np.diff(time_s)[np.diff(np.flatnonzero(keep)) > 1].max(initial=0.0)
+    if apart_s > LONGEST_GAP_S:
         raise InstrumentFileError(
-            f"the telemetry contains several runs of valve commands, {np.diff(time_s).max():.1f} s apart; give a file "
-            "with one"
+            f"the telemetry contains several runs of valve commands, {apart_s:.1f} s apart; give a file with one"
         )
     _refuse_silence(uno["time_s"], time_s)
     columns = {"time_s": time_s - time_s[0]}
